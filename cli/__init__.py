@@ -1,0 +1,1 @@
+"""Arguments in, one call, exit status out."""

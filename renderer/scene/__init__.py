@@ -1,0 +1,1 @@
+"""Scene, objects, camera and lights: what is there."""

@@ -1,0 +1,1 @@
+"""How light gets from place to place quickly."""

@@ -1,0 +1,1 @@
+"""Is this mesh fit for subsurface scattering, and can it be made so?"""
