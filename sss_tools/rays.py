@@ -84,12 +84,15 @@ class RayCaster:
         Returns distance (n,) float32 (the limit, or 1e37, where nothing is hit) and triangle (n,) int32
         (-1 where nothing is hit).
         """
-        hits = self._scene.run(origin.T, direction.T, limit, output=1)
+        # embreex writes the hit distances into the array of limits
+        reach = None if limit is None else np.array(limit, np.float32)
+        hits = self._scene.run(origin.T, direction.T, reach, output=1)
         return hits["tfar"], hits["primID"]
 
     def occluded(self, origin: Float32, direction: Float32, limit: Float32 | None = None) -> NDArray[np.bool_]:
         """(n,) whether anything lies within ``limit`` along each ray."""
-        return self._scene.run(origin.T, direction.T, limit, query="OCCLUDED") >= 0
+        reach = None if limit is None else np.array(limit, np.float32)
+        return self._scene.run(origin.T, direction.T, reach, query="OCCLUDED") >= 0
 
 
 __all__ = ["RAY_OFFSET", "RayCaster", "UnitFrame"]

@@ -1,0 +1,282 @@
+"""Lights in the unit-size frame: what they send where, and how to draw a point on them.
+
+Radiance is the same in every frame; the intensity of a point light, in power per solid angle, is divided by the
+squared scale so that intensity over squared distance stays the scene's irradiance.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sss_tools.rays import UnitFrame
+
+from .description import DirectionalLight, EnvironmentLight, Light, PointLight, RectangleLight, SphereLight
+
+Float32 = NDArray[np.float32]
+
+
+def _unit(vector) -> NDArray[np.float64]:
+    vector = np.asarray(vector, float)
+    return vector / np.linalg.norm(vector)
+
+
+def _column(vector) -> Float32:
+    return np.asarray(vector, np.float32).reshape(3, 1)
+
+
+@dataclass(frozen=True)
+class Illumination:
+    """Light that arrives at n points from one direction each.
+
+    direction   (3, n) float32 unit vectors towards the light
+    distance    (n,) float32 to the light, inf where it is infinitely far
+    irradiance  (3, n) or (3, 1) float32 on a plane across the beam, unoccluded
+    """
+
+    direction: Float32
+    distance: Float32
+    irradiance: Float32
+
+
+class Environment:
+    """Radiance from infinitely far away."""
+
+    def __init__(self, light: EnvironmentLight):
+        self.constant = None if light.radiance is None else _column(light.radiance)
+        if light.image is not None:
+            self._image = np.ascontiguousarray(np.moveaxis(light.image, -1, 0), np.float32)
+            self._turn = np.float32(light.rotation / 360)
+
+    def radiance(self, direction: Float32) -> Float32:
+        """(3, n) radiance seen along unit ``direction`` (3, n), (3, 1) where it is the same everywhere.
+
+        Images are interpolated bilinearly between the centres of their pixels, around the seam too. Row 0 is
+        +y, the centre column -z, columns grow towards +x.
+        """
+        if self.constant is not None:
+            return self.constant
+        _, height, width = self._image.shape
+        # counter-clockwise from above turns -z towards -x, against the growth of the columns
+        across = (np.arctan2(direction[0], -direction[2]) / np.float32(2 * np.pi) + np.float32(0.5) + self._turn) % 1
+        down = np.arccos(np.clip(direction[1], -1, 1)) / np.float32(np.pi)
+        x, y = across * width - np.float32(0.5), np.clip(down * height - np.float32(0.5), 0, height - 1)
+        left, top = np.floor(x).astype(np.int64), np.minimum(np.floor(y).astype(np.int64), height - 1)
+        fx, fy = x - left, y - top
+        right, bottom = (left + 1) % width, np.minimum(top + 1, height - 1)
+        left %= width
+        image = self._image
+        upper = image[:, top, left] * (1 - fx) + image[:, top, right] * fx
+        lower = image[:, bottom, left] * (1 - fx) + image[:, bottom, right] * fx
+        return upper * (1 - fy) + lower * fy
+
+
+class PointSource:
+    """A point light; ``illuminate`` as for every source without extent."""
+
+    def __init__(self, position: Float32, intensity: Float32):
+        self.position, self.intensity = position, intensity
+
+    @classmethod
+    def of(cls, light: PointLight, frame: UnitFrame) -> PointSource:
+        """The light in the frame."""
+        return cls(_column(frame.points_in(light.position)),
+                   _column(np.asarray(light.intensity, float) / frame.scale**2))  # fmt: skip
+
+    def illuminate(self, position: Float32) -> Illumination:
+        """What arrives at ``position`` (3, n)."""
+        return _from_point(self.position, position, self.intensity)
+
+
+class DirectionalSource:
+    """Parallel light."""
+
+    def __init__(self, light: DirectionalLight):
+        self.towards = _column(-_unit(light.direction))
+        self.irradiance = _column(light.irradiance)
+
+    def illuminate(self, position: Float32) -> Illumination:
+        """What arrives at ``position`` (3, n)."""
+        n = position.shape[1]
+        direction = np.broadcast_to(self.towards, (3, n))
+        return Illumination(np.ascontiguousarray(direction), np.full(n, np.inf, np.float32), self.irradiance)
+
+
+def _from_point(source: Float32, position: Float32, intensity: Float32) -> Illumination:
+    offset = source - position
+    squared = np.maximum(np.einsum("ij,ij->j", offset, offset), np.float32(1e-20))
+    distance = np.sqrt(squared)
+    return Illumination(offset / distance, distance, intensity / squared)
+
+
+class RectangleSource:
+    """A rectangle that shines from its front; its two triangles stand among the scene's."""
+
+    def __init__(self, light: RectangleLight, frame: UnitFrame):
+        normal = _unit(np.asarray(light.target, float) - light.center)
+        across = _unit(np.cross(light.up, normal))
+        upward = np.cross(normal, across)
+        half = np.asarray(light.half, float) / frame.scale
+        center = frame.points_in(light.center)
+        self.normal, self.center, self.radiance = _column(normal), _column(center), _column(light.radiance)
+        self.sides = _column(across * half[0]), _column(upward * half[1])
+        self.area = float(4 * half[0] * half[1])
+        corners = [
+            center + a * across * half[0] + b * upward * half[1] for a, b in ((-1, -1), (1, -1), (1, 1), (-1, 1))
+        ]
+        self.vertices, self.triangles = np.array(corners), np.array([[0, 1, 2], [0, 2, 3]])
+
+    def sample(self, position: Float32, u1: Float32, u2: Float32) -> Illumination:
+        """Light from a random point of the rectangle; the mean over (u1, u2) is the whole rectangle's."""
+        chosen = self.center + (2 * u1 - 1) * self.sides[0] + (2 * u2 - 1) * self.sides[1]
+        offset = position - chosen
+        squared = np.maximum(np.einsum("ij,ij->j", offset, offset), np.float32(1e-20))
+        distance = np.sqrt(squared)
+        emitted = np.maximum(np.einsum("ij,ik->k", self.normal, offset), 0) / distance
+        return Illumination(-offset / distance, distance, self.radiance * (emitted * self.area / squared))
+
+
+class SphereSource:
+    """A shining ball, met by rays in closed form (no tessellation, no bias)."""
+
+    def __init__(self, light: SphereLight, frame: UnitFrame):
+        self.center = _column(frame.points_in(light.center))
+        self.radius = np.float32(light.radius / frame.scale)
+        self.radiance = _column(light.radiance)
+
+    def distance(self, origin: Float32, direction: Float32) -> Float32:
+        """(n,) distance at which rays from outside meet the ball, inf where they do not.
+
+        The nearer root of |o + t d - c| = r, with the discriminant taken from the distance between centre and
+        ray: it does not cancel far away (Haines et al. 2019, Ray Tracing Gems, ch. 7, eq. 5).
+        """
+        offset = self.center - origin
+        along = np.einsum("ij,ij->j", offset, direction)
+        beside = offset - along * direction
+        remainder = self.radius * self.radius - np.einsum("ij,ij->j", beside, beside)
+        near = along - np.sqrt(np.maximum(remainder, 0))
+        return np.where((remainder > 0) & (near > 0), near, np.float32(np.inf))
+
+    def sample(self, position: Float32, u1: Float32, u2: Float32) -> Illumination:
+        """Light from a random direction within the cone the ball fills, uniform in solid angle."""
+        from ..optics.phase import around, spherical
+
+        offset = self.center - position
+        distance = np.sqrt(np.einsum("ij,ij->j", offset, offset))
+        sine2 = np.minimum((self.radius / np.maximum(distance, self.radius)) ** 2, 1)
+        # 1 - cos without cancellation for small balls
+        spread = sine2 / (1 + np.sqrt(1 - sine2))
+        local = spherical(1 - u1 * spread, u2, np.empty_like(offset))
+        direction = around(offset / np.maximum(distance, np.float32(1e-20)), local)
+        reach = np.minimum(self.distance(position, direction), distance)
+        return Illumination(direction, reach, self.radiance * (np.float32(2 * np.pi) * spread))
+
+
+@dataclass(frozen=True)
+class Beam:
+    """A share of the scene's light that comes from one place, for shaders that take no random samples.
+
+    ambient   a constant environment: ``radiance`` from everywhere, and ``at`` must not be called
+    radiance  (3,) float32, ambient beams only
+    """
+
+    source: PointSource | DirectionalSource | RectanglePart | None = None
+    radiance: Float32 | None = None
+
+    @property
+    def ambient(self) -> bool:
+        """Whether the light comes from everywhere alike."""
+        return self.source is None
+
+    def at(self, position: Float32) -> tuple[Float32, Float32, Float32]:
+        """Direction to the light (3, n), distance (n,), irradiance across the beam (3, n) at ``position`` (3, n)."""
+        assert self.source is not None, "an ambient beam comes from everywhere"
+        light = self.source.illuminate(position)
+        return light.direction, light.distance, np.broadcast_to(light.irradiance, position.shape)
+
+
+class RectanglePart:
+    """A part of a rectangle shrunk to its centre, with the cosine of emission."""
+
+    def __init__(self, center: Float32, normal: Float32, intensity: Float32):
+        self.center, self.normal, self.intensity = center, normal, intensity
+
+    def illuminate(self, position: Float32) -> Illumination:
+        """What arrives at ``position`` (3, n)."""
+        light = _from_point(self.center, position, self.intensity)
+        emitted = np.maximum(-np.einsum("ij,ik->k", self.normal, light.direction), 0)
+        return Illumination(light.direction, light.distance, light.irradiance * emitted)
+
+
+class LightSet:
+    """All lights of a scene, in its frame, by what one can do with them."""
+
+    def __init__(self, lights: Sequence[Light], frame: UnitFrame):
+        self.environments = [Environment(light) for light in lights if isinstance(light, EnvironmentLight)]
+        self.points: list[PointSource | DirectionalSource] = []
+        self.rectangles: list[RectangleSource] = []
+        self.spheres: list[SphereSource] = []
+        for light in lights:
+            if isinstance(light, PointLight):
+                self.points.append(PointSource.of(light, frame))
+            elif isinstance(light, DirectionalLight):
+                self.points.append(DirectionalSource(light))
+            elif isinstance(light, RectangleLight):
+                self.rectangles.append(RectangleSource(light, frame))
+            elif isinstance(light, SphereLight):
+                self.spheres.append(SphereSource(light, frame))
+
+    def background(self, direction: Float32) -> Float32:
+        """(3, n) radiance that rays meet when they leave the scene along ``direction``."""
+        total = np.zeros_like(direction)
+        for environment in self.environments:
+            total += environment.radiance(direction)
+        return total
+
+    def beams(self, rectangle_parts: int = 2, environment_directions: int = 48) -> list[Beam]:
+        """A fixed quadrature of all lights.
+
+        rectangle_parts         parts along each side of a rectangle
+        environment_directions  directions that stand for an environment image; a constant one is one ambient beam
+        """
+        beams = [Beam(source) for source in self.points]
+        for rectangle in self.rectangles:
+            share = (np.arange(rectangle_parts, dtype=np.float32) * 2 + 1) / rectangle_parts - 1
+            intensity = rectangle.radiance * np.float32(rectangle.area / rectangle_parts**2)
+            beams += [
+                Beam(RectanglePart(rectangle.center + a * rectangle.sides[0] + b * rectangle.sides[1],
+                                   rectangle.normal, intensity))
+                for a in share for b in share
+            ]  # fmt: skip
+        for sphere in self.spheres:
+            intensity = sphere.radiance * np.float32(np.pi * sphere.radius**2)
+            beams.append(Beam(PointSource(sphere.center, intensity)))
+        for environment in self.environments:
+            if environment.constant is not None:
+                beams.append(Beam(radiance=environment.constant[:, 0]))
+            else:
+                beams += _environment_beams(environment, environment_directions)
+        return beams
+
+
+def _environment_beams(environment: Environment, count: int) -> list[Beam]:
+    """Directions spread evenly (a Fibonacci lattice), each with the mean radiance of the directions nearest to it."""
+    centres = fibonacci_directions(count)
+    samples = fibonacci_directions(256 * count)
+    nearest = np.argmax(centres.T @ samples, axis=0)
+    seen = environment.radiance(samples)
+    totals = np.stack([np.bincount(nearest, channel, count) for channel in seen])
+    irradiance = totals * (4 * np.pi / samples.shape[1])
+    return [Beam(DirectionalSource(DirectionalLight(-centres[:, k], irradiance[:, k]))) for k in range(count)]
+
+
+def fibonacci_directions(count: int) -> Float32:
+    """(3, count) unit vectors spread evenly over the sphere (Swinbank & Purser 2006, QJRMS 132, eq. 1-2)."""
+    k = np.arange(count)
+    z = 1 - (2 * k + 1) / count
+    turn = k * np.pi * (3 - np.sqrt(5))
+    radius = np.sqrt(1 - z * z)
+    return np.stack([radius * np.cos(turn), radius * np.sin(turn), z]).astype(np.float32)

@@ -1,0 +1,1 @@
+"""How each object's light is found."""

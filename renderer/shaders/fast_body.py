@@ -1,0 +1,112 @@
+"""Objects lit by a shader other than path: scattered light from one call, the boundary's reflection as in path.
+
+The dielectric boundary is the same for all shaders, so highlights and reflections do not jump where the shader
+changes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from types import ModuleType
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..optics.dielectric import fresnel_reflectance
+from ..optics.microfacet import sample_visible_facet, scatter, unmasked
+from ..scene.lights import Beam
+from ..tracing.paths import Paths
+from ..tracing.streams import Uniforms
+from ..tracing.tally import Tally
+from ..tracing.traced_scene import TracedObject, TracedScene, offset_from
+from .direct_light import pick, received
+from .local_frame import LocalFrame
+from .surface import BodyOptics, SurfacePoints, outgoing_radiance
+
+Float32 = NDArray[np.float32]
+
+
+@dataclass
+class FastBody:
+    """An object with the shader module (plumb, scalar or diffuse) that lights it.
+
+    curvature  (faces of the object, 3) float32 mean curvature at the corners, in the frame; None where the shader
+               needs none
+    """
+
+    thing: TracedObject
+    shader: ModuleType
+    optics: BodyOptics
+    beams: Sequence[Beam]
+    curvature: Float32 | None
+
+    def meet(
+        self,
+        scene: TracedScene,
+        paths: Paths,
+        index: NDArray[np.intp],
+        triangle: NDArray[np.int32],
+        uniforms: Uniforms,
+        tally: Tally,
+        radiance: Float32,
+    ) -> None:
+        """Add the body's scattered light to the paths ``index`` that meet it, and send them on by reflection."""
+        geometric = np.take(scene.triangle_normal, triangle, axis=1)
+        direction, position = paths.direction[:, index], paths.origin[:, index]
+        side = -np.copysign(np.float32(1), np.einsum("ij,ij->j", direction, geometric))
+        facing, normal = geometric * side, scene.shading_normal(position, triangle) * side
+        view_cosine = np.clip(-np.einsum("ij,ij->j", direction, normal), np.float32(1e-4), 1)
+        points = SurfacePoints(position, normal, self._curvature_at(scene, position, triangle))
+        exitance = self.shader.exitance(scene, points, self.optics, self.beams)
+        leaving = outgoing_radiance(exitance, view_cosine, self.optics.ior)
+        radiance[:, paths.sample[index]] += paths.throughput[:, index] * leaving
+        assert self.thing.medium is not None
+        eta = float(self.thing.medium.ior)
+        if eta == 1:
+            paths.alive[index] = False
+        elif self.thing.roughness == 0:
+            reflectance, _ = fresnel_reflectance(view_cosine, eta)
+            paths.throughput[:, index] *= reflectance
+            turned = direction + 2 * view_cosine * normal
+            self._send_on(paths, index, position, facing, turned)
+        else:
+            self._reflect_rough(scene, paths, index, position, normal, facing, eta, uniforms, tally, radiance)
+
+    def _curvature_at(self, scene: TracedScene, position: Float32, triangle: NDArray[np.int32]) -> Float32:
+        if self.curvature is None:
+            return np.zeros(len(triangle), np.float32)
+        corners = self.curvature[triangle - self.thing.first_triangle]
+        return np.einsum("ij,ji->j", scene.barycentric(position, triangle), corners)
+
+    def _reflect_rough(self, scene, paths, index, position, normal, facing, eta, uniforms, tally, radiance) -> None:
+        """The reflecting half of the GGX boundary, with the highlights of lights without extent."""
+        alpha = self.thing.roughness
+        frame = LocalFrame(normal)
+        view = frame.to_local(-paths.direction[:, index])
+        view[2] = np.maximum(view[2], np.float32(1e-4))
+        for source in scene.lights.points:
+            light = source.illuminate(position)
+            to_light = frame.to_local(light.direction)
+            lit = np.flatnonzero((to_light[2] > 0) & (np.einsum("ij,ij->j", facing, light.direction) > 0))
+            if len(lit):
+                who = index[lit]
+                value = scatter(view[:, lit], to_light[:, lit], eta, alpha)
+                arrived = received(scene, position[:, lit], facing[:, lit], pick(light, lit),
+                                   paths.inside[:, who], paths.owner[who], tally)  # fmt: skip
+                radiance[:, paths.sample[who]] += paths.throughput[:, who] * arrived * value
+        u1, u2 = uniforms.draw_at(paths.stream, index)
+        facet = sample_visible_facet(view, alpha, u1, u2)
+        cos_in = np.clip(np.einsum("ij,ij->j", view, facet), 0, 1)
+        reflectance, _ = fresnel_reflectance(cos_in, eta)
+        turned = 2 * cos_in * facet - view
+        weight = np.where(turned[2] > 0, reflectance * unmasked(turned[2], alpha), 0)
+        paths.throughput[:, index] *= weight
+        self._send_on(paths, index, position, facing, frame.to_world(turned))
+
+    @staticmethod
+    def _send_on(paths: Paths, index: NDArray[np.intp], position: Float32, facing: Float32, turned: Float32) -> None:
+        paths.alive[index] &= np.einsum("ij,ij->j", turned, facing) > 0
+        paths.direction[:, index] = turned
+        paths.origin[:, index] = offset_from(position, facing, np.ones(len(index), np.float32))
+        paths.lit[index] = False

@@ -1,0 +1,87 @@
+"""Floors and walls: Lambertian and mirror surfaces, and the patch that stands in for missing surface."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..optics.phase import around, spherical
+from ..tracing.paths import Paths
+from ..tracing.streams import Uniforms
+from ..tracing.tally import Tally
+from ..tracing.traced_scene import TracedScene, offset_from
+from .direct_light import arriving, pick, received
+
+Float32 = NDArray[np.float32]
+Indices = NDArray[np.intp]
+
+
+def cosine_direction(normal: Float32, u1: Float32, u2: Float32) -> Float32:
+    """(3, n) directions around unit normals with density cos / pi: uniform on the disk, lifted (Malley's method)."""
+    return around(normal, spherical(np.sqrt(1 - u1), u2, np.empty_like(normal)))
+
+
+def meet_diffuse(
+    scene: TracedScene,
+    paths: Paths,
+    index: Indices,
+    triangle: NDArray[np.int32],
+    uniforms: Uniforms,
+    tally: Tally,
+    radiance: Float32,
+) -> None:
+    """Light the Lambertian points where the paths ``index`` are, and send the paths on by the cosine.
+
+    Area lights are sampled here, so the path must not count one that it meets next (``Paths.lit``);
+    environments are met by chance.
+    """
+    geometric = np.take(scene.triangle_normal, triangle, axis=1)
+    direction, position = paths.direction[:, index], paths.origin[:, index]
+    side = -np.copysign(np.float32(1), np.einsum("ij,ij->j", direction, geometric))
+    facing = geometric * side
+    shading = scene.shading_normal(position, triangle) * side
+    reflectance = scene.reflectance[:, scene.triangle_object[triangle]]
+    paths.throughput[:, index] *= reflectance
+    for light in arriving(scene, position, lambda: uniforms.draw_at(paths.stream, index)):
+        cosine = np.einsum("ij,ij->j", shading, light.direction)
+        lit = np.flatnonzero((cosine > 0) & (np.einsum("ij,ij->j", facing, light.direction) > 0))
+        if len(lit):
+            who = index[lit]
+            arrived = received(scene, position[:, lit], facing[:, lit], pick(light, lit),
+                               paths.inside[:, who], paths.owner[who], tally)  # fmt: skip
+            radiance[:, paths.sample[who]] += paths.throughput[:, who] * arrived * (cosine[lit] / np.float32(np.pi))
+    u1, u2 = uniforms.draw_at(paths.stream, index)
+    turned = cosine_direction(shading, u1, u2)
+    paths.alive[index] &= np.einsum("ij,ij->j", turned, facing) > 0
+    paths.direction[:, index] = turned
+    paths.origin[:, index] = offset_from(position, facing, np.ones_like(side))
+    paths.lit[index] = True
+
+
+def meet_mirror(scene: TracedScene, paths: Paths, index: Indices, triangle: NDArray[np.int32]) -> None:
+    """Reflect the paths ``index`` at a perfect mirror."""
+    geometric = np.take(scene.triangle_normal, triangle, axis=1)
+    direction, position = paths.direction[:, index], paths.origin[:, index]
+    side = -np.copysign(np.float32(1), np.einsum("ij,ij->j", direction, geometric))
+    shading = scene.shading_normal(position, triangle)
+    turned = direction - 2 * np.einsum("ij,ij->j", direction, shading) * shading
+    wrong = np.einsum("ij,ij->j", turned, geometric) * side <= 0
+    turned[:, wrong] = (direction - 2 * np.einsum("ij,ij->j", direction, geometric) * geometric)[:, wrong]
+    paths.throughput[:, index] *= scene.reflectance[:, scene.triangle_object[triangle]]
+    paths.direction[:, index] = turned
+    paths.origin[:, index] = offset_from(position, geometric, side)
+    paths.lit[index] = False
+
+
+def patch_radiance(scene: TracedScene, position: Float32, facing: Float32, draw) -> Float32:
+    """(3, n) radiance of a white Lambertian patch at ``position`` that faces ``facing``, shadows left out.
+
+    Multiplied by the material's colour this is what a path returns that has left through a hole, or slipped
+    through the surface: "infinitely long" inside, it would have taken on the material's colour (Wadkien 2008).
+    """
+    u1, u2 = draw()
+    total = scene.lights.background(cosine_direction(facing, u1, u2))
+    for light in arriving(scene, position, draw):
+        cosine = np.maximum(np.einsum("ij,ij->j", facing, light.direction), 0)
+        total += light.irradiance * (cosine / np.float32(np.pi))
+    return total

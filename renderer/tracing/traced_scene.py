@@ -1,0 +1,215 @@
+"""The scene as rays see it: one Embree scene in a frame of unit size, and what each triangle belongs to."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sss_tools.medium import Medium, diffuse_reflectance
+from sss_tools.mesh import Mesh
+from sss_tools.rays import RAY_OFFSET, RayCaster, UnitFrame
+
+from ..scene.description import Scene, SceneObject, Translucent
+from ..scene.lights import LightSet
+from .media import MediaTable
+
+Float32 = NDArray[np.float32]
+MISS = np.float32(1e37)
+"""Distance of rays that meet nothing, as Embree has it."""
+
+
+@dataclass(frozen=True)
+class TracedObject:
+    """What the tracer knows of an object.
+
+    index          its place in the scene
+    first_triangle where its triangles begin among the scene's
+    medium         coefficients per unit of the frame; None for opaque objects
+    roughness      GGX alpha of the boundary
+    colour         (3, 1) reflectance of opaque objects, diffuse reflectance of the media of translucent ones
+    shader         "path", "plumb", "scalar" or "diffuse" for translucent objects, "opaque" or "mirror"
+    hole_handling  "strict", "terminate" or "surface"
+    shells_add_up  closed but flagged: surfaces inside the solid are counted, not taken for holes
+    lower, upper   (3, 1) bounding box in the frame
+    """
+
+    index: int
+    first_triangle: int
+    medium: Medium | None
+    roughness: float
+    colour: Float32
+    shader: str
+    hole_handling: str
+    shells_add_up: bool
+    lower: Float32
+    upper: Float32
+
+    @property
+    def transports(self) -> bool:
+        """Whether light is followed through its inside."""
+        return self.shader == "path"
+
+    @property
+    def is_matched(self) -> bool:
+        """Whether its boundary is invisible."""
+        return self.medium is not None and self.medium.ior == 1
+
+
+class TracedScene:
+    """Geometry, lights and materials in the unit-size frame.
+
+    Triangles of the objects come first, in scene order; those of rectangle lights come last.
+
+    caster           the Embree scene
+    triangle_object  (t,) int16 object index, -1 for lights
+    triangle_normal  (3, t) float32 unit geometric normals, outward
+    translucent      the objects whose inside light is followed through; their places here are the slots
+    media            their media, by slot
+    slot_of_triangle (t,) slot, -1 for lights, opaque objects and those with a faster shader
+    slot_is_matched  (k + 1,) bool, whether a slot's boundary is invisible; the last, for slot -1, is False
+    reflectance      (3, objects) colour of each object
+    frame            between the frame and scene units
+    """
+
+    def __init__(self, scene: Scene, shaders: list[str], hole_handling: list[str]):
+        lower = np.min([thing.mesh.bounds[0] for thing in scene.objects], axis=0)
+        upper = np.max([thing.mesh.bounds[1] for thing in scene.objects], axis=0)
+        self.scene = scene
+        self.frame = UnitFrame.around(lower, upper)
+        self.lights = LightSet(scene.lights, self.frame)
+        self.objects = [
+            self._traced(index, thing, shader, handling)
+            for index, (thing, shader, handling) in enumerate(zip(scene.objects, shaders, hole_handling, strict=True))
+        ]
+        vertices = [self.frame.points_in(thing.mesh.vertices) for thing in scene.objects]
+        triangles = [thing.mesh.faces for thing in scene.objects]
+        owners = [np.full(len(thing.mesh.faces), index) for index, thing in enumerate(scene.objects)]
+        self.first_light_triangle = sum(map(len, triangles))
+        for rectangle in self.lights.rectangles:
+            vertices.append(rectangle.vertices)
+            triangles.append(rectangle.triangles)
+            owners.append(np.full(len(rectangle.triangles), -1))
+        offsets = np.cumsum([0] + [len(block) for block in vertices[:-1]])
+        all_vertices = np.concatenate(vertices).astype(np.float32)
+        all_triangles = np.concatenate([block + offset for block, offset in zip(triangles, offsets, strict=True)])
+        self.triangle_object = np.concatenate(owners).astype(np.int16)
+        # from the rounded vertices, which are what Embree sees
+        corners = all_vertices.astype(np.float64)[all_triangles]
+        normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        length = np.linalg.norm(normals, axis=1, keepdims=True)
+        normals = np.divide(normals, length, out=np.zeros_like(normals), where=length > 0)
+        self.triangle_normal = np.ascontiguousarray(normals.T, np.float32)
+        self.triangle_plane = np.einsum("ij,ij->i", normals, corners.mean(axis=1)).astype(np.float32)
+        self.reflectance = np.concatenate([thing.colour for thing in self.objects], axis=1)
+        self.caster = RayCaster(all_vertices, all_triangles)
+        self._edges = np.ascontiguousarray((corners[:, 1:] - corners[:, :1]).transpose(1, 2, 0), np.float32)
+        self._corner = np.ascontiguousarray(corners[:, 0].T, np.float32)
+        smooth = any(thing.normals == "smooth" for thing in scene.objects)
+        self._smooth = SmoothNormals(scene.objects, len(all_triangles)) if smooth else None
+        self.translucent = [thing for thing in self.objects if thing.transports]
+        self.media = MediaTable([thing.medium for thing in self.translucent if thing.medium is not None])
+        # the last entries serve lights (object -1) and opaque objects (slot -1)
+        slot_of_object = np.full(len(self.objects) + 1, -1)
+        slot_of_object[[thing.index for thing in self.translucent]] = np.arange(len(self.translucent))
+        self.slot_of_triangle = slot_of_object[self.triangle_object]
+        self.slot_is_matched = np.array([*(thing.is_matched for thing in self.translucent), False])
+
+    def _traced(self, index: int, thing: SceneObject, shader: str, handling: str) -> TracedObject:
+        material = thing.material
+        if isinstance(material, Translucent):
+            medium, roughness = material.medium.scaled(self.frame.scale), material.roughness
+            colour = diffuse_reflectance(replace(medium, ior=1.0))
+        else:
+            medium, roughness, colour = None, 0.0, material.reflectance
+        bounds = self.frame.points_in(thing.mesh.bounds).astype(np.float32)
+        shells_add_up = thing.closedness is not None and thing.closedness.state == "closed"
+        first = sum(len(other.mesh.faces) for other in self.scene.objects[:index])
+        return TracedObject(index, first, medium, roughness, np.asarray(colour, np.float32).reshape(3, 1), shader, handling,
+                            shells_add_up, bounds[0][:, None], bounds[1][:, None])  # fmt: skip
+
+    def closest(self, origin: Float32, direction: Float32, limit: Float32 | None = None):
+        """As ``RayCaster.closest``."""
+        return self.caster.closest(origin, direction, limit)
+
+    def on_plane(self, position: Float32, triangle: NDArray[np.int32]) -> Float32:
+        """(3, n) hit points moved back onto their triangle's plane.
+
+        ``origin + t * direction`` is wrong by t's rounding, which for a camera a hundred object sizes away is
+        more than the ray offset; what counts is the part along the normal.
+        """
+        normal = np.take(self.triangle_normal, triangle, axis=1)
+        height = np.einsum("ij,ij->j", normal, position) - np.take(self.triangle_plane, triangle)
+        return position - height * normal
+
+    def shading_normal(self, position: Float32, triangle: NDArray[np.int32]) -> Float32:
+        """(3, n) outward unit normals for shading: interpolated on objects that ask for it, else geometric."""
+        normal = np.take(self.triangle_normal, triangle, axis=1)
+        if self._smooth is None:
+            return normal
+        return self._smooth.interpolate(self.barycentric(position, triangle), triangle, normal)
+
+    def barycentric(self, position: Float32, triangle: NDArray[np.int32]) -> Float32:
+        """(3, n) weights of the triangles' corners at points on them, each in [0, 1]."""
+        first, second = (np.take(edge, triangle, axis=1) for edge in self._edges)
+        offset = position - np.take(self._corner, triangle, axis=1)
+        aa, ab, bb = (np.einsum("ij,ij->j", *pair) for pair in ((first, first), (first, second), (second, second)))
+        ap, bp = (np.einsum("ij,ij->j", edge, offset) for edge in (first, second))
+        whole = np.maximum(aa * bb - ab * ab, np.float32(1e-30))
+        v, w = (bb * ap - ab * bp) / whole, (aa * bp - ab * ap) / whole
+        weights = np.clip(np.stack([1 - v - w, v, w]), 0, 1)
+        return weights / weights.sum(axis=0)
+
+    def occluded(self, origin: Float32, direction: Float32, limit: Float32 | None = None) -> NDArray[np.bool_]:
+        """As ``RayCaster.occluded``."""
+        return self.caster.occluded(origin, direction, limit)
+
+
+class SmoothNormals:
+    """Normals at the corners of triangles, interpolated on objects with ``normals = "smooth"``."""
+
+    def __init__(self, objects: Sequence[SceneObject], triangle_count: int):
+        self._corners = np.zeros((triangle_count, 3, 3), np.float32)
+        self._applies = np.zeros(triangle_count, bool)
+        first = 0
+        for thing in objects:
+            last = first + len(thing.mesh.faces)
+            if thing.normals == "smooth":
+                self._corners[first:last] = corner_normals(thing.mesh)
+                self._applies[first:last] = True
+            first = last
+
+    def interpolate(self, weights: Float32, triangle: NDArray[np.int32], flat: Float32) -> Float32:
+        """(3, n) unit normals at barycentric ``weights`` (3, n); ``flat`` (3, n) where the object is not smooth."""
+        mixed = np.einsum("ki,ikj->ji", weights, self._corners[triangle])
+        length = np.sqrt(np.einsum("ij,ij->j", mixed, mixed))
+        usable = np.take(self._applies, triangle) & (length > 1e-6)
+        return np.where(usable, mixed / np.maximum(length, np.float32(1e-6)), flat)
+
+
+def corner_normals(mesh: Mesh) -> Float32:
+    """(m, 3, 3) unit vertex normals at the three corners of each face.
+
+    The mean of the normals of the faces around, weighted by the corner's angle (Thuermer & Wuthrich 1998, JGT
+    3(1)), over exactly coincident vertices, so that UV seams do not show.
+    """
+    topology = mesh.topology
+    corners = mesh.vertices[mesh.faces]
+    total = np.zeros_like(topology.points)
+    for k in range(3):
+        a, b = corners[:, (k + 1) % 3] - corners[:, k], corners[:, (k + 2) % 3] - corners[:, k]
+        lengths = np.linalg.norm(a, axis=1) * np.linalg.norm(b, axis=1)
+        cosine = np.einsum("ij,ij->i", a, b) / np.where(lengths > 0, lengths, 1)
+        angle = np.arccos(np.clip(cosine, -1, 1))
+        for axis in range(3):
+            total[:, axis] += np.bincount(topology.faces[:, k], angle * mesh.face_normals[:, axis], len(total))
+    length = np.linalg.norm(total, axis=1, keepdims=True)
+    unit = np.divide(total, length, out=np.zeros_like(total), where=length > 0)
+    return unit[topology.faces].astype(np.float32)
+
+
+def offset_from(position: Float32, normal: Float32, side: Float32) -> Float32:
+    """(3, n) ray origins just off a surface, on the side of ``normal`` that ``side`` (n,), +1 or -1, tells."""
+    return position + (np.copysign(RAY_OFFSET, side) * normal)
