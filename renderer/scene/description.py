@@ -126,6 +126,7 @@ class SceneObject:
     normals     "flat" or "smooth" shading normals
     shader      what the scene asks for; "auto" leaves it to the selection
     closedness  what the check found; None until it ran
+    source      the mesh as its file has it, before the transform: records beside the file are about this one
     """
 
     name: str
@@ -136,6 +137,7 @@ class SceneObject:
     shader: ShaderChoice = "auto"
     hole_handling: HoleHandling = "auto"
     closedness: Closedness | None = None
+    source: Mesh | None = None
 
 
 @dataclass(frozen=True)

@@ -94,9 +94,13 @@ class PointSource:
 class DirectionalSource:
     """Parallel light."""
 
-    def __init__(self, light: DirectionalLight):
-        self.towards = _column(-_unit(light.direction))
-        self.irradiance = _column(light.irradiance)
+    def __init__(self, towards: Float32, irradiance: Float32):
+        self.towards, self.irradiance = towards, irradiance
+
+    @classmethod
+    def of(cls, light: DirectionalLight) -> DirectionalSource:
+        """The light, which is the same in every frame."""
+        return cls(_column(-_unit(light.direction)), _column(light.irradiance))
 
     def illuminate(self, position: Float32) -> Illumination:
         """What arrives at ``position`` (3, n)."""
@@ -223,7 +227,7 @@ class LightSet:
             if isinstance(light, PointLight):
                 self.points.append(PointSource.of(light, frame))
             elif isinstance(light, DirectionalLight):
-                self.points.append(DirectionalSource(light))
+                self.points.append(DirectionalSource.of(light))
             elif isinstance(light, RectangleLight):
                 self.rectangles.append(RectangleSource(light, frame))
             elif isinstance(light, SphereLight):
@@ -270,7 +274,7 @@ def _environment_beams(environment: Environment, count: int) -> list[Beam]:
     seen = environment.radiance(samples)
     totals = np.stack([np.bincount(nearest, channel, count) for channel in seen])
     irradiance = totals * (4 * np.pi / samples.shape[1])
-    return [Beam(DirectionalSource(DirectionalLight(-centres[:, k], irradiance[:, k]))) for k in range(count)]
+    return [Beam(DirectionalSource(_column(centres[:, k]), _column(irradiance[:, k]))) for k in range(count)]
 
 
 def fibonacci_directions(count: int) -> Float32:

@@ -1,0 +1,200 @@
+"""The film: what all camera samples so far add up to."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from . import passes
+from .passes import Ranges
+
+Float64 = NDArray[np.float64]
+
+_ARRAYS = ("sum", "sum_of_squares", "hits", "left_out", "biased")
+
+
+@dataclass(eq=False)
+class Film:
+    """Sums over camera samples; a pass is one sample in every pixel. Arrays are (h, w, ...), row 0 on top.
+
+    scene_hash      of the scene that the samples are of
+    seed            of the random numbers
+    sum             (h, w, 3) float64, of radiance
+    sum_of_squares  (h, w, 3) float64, of squared radiance
+    hits            (h, w) int32, samples that met a translucent object first
+    left_out        (h, w) int32, samples with a channel that is NaN or infinite: counted, and not in the sums
+    biased          (h, w) bool, pixels with samples of a shader whose standard error says nothing of its error
+    ranges          the passes done
+
+    Sums of n float64 numbers >= 0 are off by at most (n - 1) 1.1e-16 of their value, in whatever order they
+    are added (Higham 2002, Accuracy and Stability of Numerical Algorithms, eq. 4.4); radiance and its square
+    are exact in float64, coming from float32. So films of up to 4000 passes, split and merged in any way, agree
+    to 1e-12 without relying on roundings to cancel, and far larger ones do in practice. Passes added to one
+    film in the same order give the same bits.
+    """
+
+    scene_hash: str
+    seed: int
+    sum: Float64
+    sum_of_squares: Float64
+    hits: NDArray[np.int32]
+    left_out: NDArray[np.int32]
+    biased: NDArray[np.bool_]
+    ranges: Ranges = ()
+
+    @classmethod
+    def blank(cls, resolution: tuple[int, int], scene_hash: str = "", seed: int = 0) -> Film:
+        """A film without samples. ``resolution`` is (width, height)."""
+        width, height = resolution
+        flat, colour = (height, width), (height, width, 3)
+        return cls(
+            scene_hash,
+            seed,
+            sum=np.zeros(colour),
+            sum_of_squares=np.zeros(colour),
+            hits=np.zeros(flat, np.int32),
+            left_out=np.zeros(flat, np.int32),
+            biased=np.zeros(flat, bool),
+        )
+
+    @property
+    def passes(self) -> int:
+        """How many passes are done."""
+        return passes.count(self.ranges)
+
+    @property
+    def resolution(self) -> tuple[int, int]:
+        """Width and height."""
+        height, width = self.hits.shape
+        return width, height
+
+    @property
+    def non_finite(self) -> int:
+        """Samples left out, over all pixels."""
+        return int(self.left_out.sum())
+
+    def add_pass(
+        self,
+        index: int,
+        radiance: NDArray[np.float32],
+        hit: NDArray[np.bool_],
+        biased: NDArray[np.bool_] | None = None,
+    ) -> None:
+        """Add pass number ``index``.
+
+        radiance  (h, w, 3) float32
+        hit       (h, w) bool, whether the sample met a translucent object first
+        biased    (h, w) bool, whether a biased shader made it; None: nowhere
+
+        An interrupt leaves the film with the whole pass or without it. Raises ValueError for another shape and
+        for a pass that was added before.
+        """
+        for name, array, shape in (("radiance", radiance, self.sum.shape), ("hit", hit, self.hits.shape)):
+            if array.shape != shape:
+                raise ValueError(f"{name} has shape {array.shape}, the film needs {shape}")
+        ranges = passes.united(self.ranges, ((index, index + 1),))
+        finite = np.logical_and.reduce(np.isfinite(radiance), axis=-1, keepdims=True)
+        if not finite.all():
+            radiance = np.where(finite, radiance, np.float32(0))
+        self._take(
+            ranges,
+            self.sum + radiance,
+            self.sum_of_squares + np.square(radiance, dtype=np.float64),
+            self.hits + hit,
+            self.left_out + ~finite[..., 0],
+            self.biased if biased is None else self.biased | biased,
+        )
+
+    def merge(self, other: Film) -> None:
+        """Add the passes of another film of the same scene, seed and size.
+
+        Raises ValueError, saying what differs, for a film that does not belong to this one or has passes in
+        common with it.
+        """
+        for name in ("resolution", "scene_hash", "seed"):
+            mine, theirs = getattr(self, name), getattr(other, name)
+            if mine != theirs:
+                raise ValueError(f"the {name.replace('_', ' ')} differs: {mine} and {theirs}")
+        self._take(
+            passes.united(self.ranges, other.ranges),
+            self.sum + other.sum,
+            self.sum_of_squares + other.sum_of_squares,
+            self.hits + other.hits,
+            self.left_out + other.left_out,
+            self.biased | other.biased,
+        )
+
+    def _take(self, ranges, total, squares, hits, left_out, biased) -> None:
+        # new arrays, put in place by plain assignments, between which no interrupt is delivered
+        self.ranges, self.sum, self.sum_of_squares = ranges, total, squares
+        self.hits, self.left_out, self.biased = hits, left_out, biased
+
+    def mean(self) -> Float64:
+        """(h, w, 3) mean radiance; NaN in pixels without a sample."""
+        return _ratio(self.sum, self._samples())
+
+    def stderr(self) -> Float64:
+        """(h, w, 3) standard error of the mean, sqrt(s^2 / n) with the unbiased variance s^2.
+
+        NaN in pixels with fewer than two samples, and in biased ones.
+        """
+        n = self._samples()
+        # rounding can leave a few ulps below zero where all samples are equal
+        variance = np.maximum(_ratio(self.sum_of_squares - self.sum * _ratio(self.sum, n), n - 1), 0)
+        error = np.sqrt(_ratio(variance, n))
+        error[self.biased] = np.nan
+        return error
+
+    def object_pixels(self) -> NDArray[np.bool_]:
+        """(h, w) pixels whose every camera sample met a translucent object first."""
+        return (self.hits == self.passes) & (self.passes > 0)
+
+    def mean_relative_stderr(self) -> float:
+        """Mean of stderr / mean over object pixels and channels.
+
+        Means that are zero are left out, and so is what has no standard error; NaN where nothing remains.
+        """
+        where = self.object_pixels()
+        mean, error = self.mean()[where], self.stderr()[where]
+        usable = (mean > 0) & np.isfinite(error)
+        return float((error[usable] / mean[usable]).mean()) if usable.any() else float("nan")
+
+    def _samples(self) -> NDArray[np.integer]:
+        """(h, w, 1) samples in the sums."""
+        return (self.passes - self.left_out)[..., None]
+
+    def arrays(self) -> dict[str, NDArray]:
+        """Everything needed to go on or to merge, for a file."""
+        return {
+            "film_scene_hash": np.array(self.scene_hash),
+            "film_seed": np.array(str(self.seed)),
+            "film_ranges": np.array(self.ranges, np.int64).reshape(-1, 2),
+            **{f"film_{name}": getattr(self, name) for name in _ARRAYS},
+        }
+
+    @classmethod
+    def from_arrays(cls, arrays: Mapping[str, NDArray]) -> Film:
+        """The film that ``arrays`` were made of. Raises KeyError or ValueError for arrays of no film."""
+        film = cls(
+            scene_hash=str(arrays["film_scene_hash"]),
+            seed=int(str(arrays["film_seed"])),
+            ranges=passes.checked(arrays["film_ranges"]),
+            **{name: arrays[f"film_{name}"] for name in _ARRAYS},
+        )
+        if film.hits.ndim != 2:
+            raise ValueError(f"hits has shape {film.hits.shape}")
+        blank = cls.blank(film.resolution)
+        for name in _ARRAYS:
+            array, like = getattr(film, name), getattr(blank, name)
+            if array.shape != like.shape or array.dtype != like.dtype:
+                raise ValueError(f"{name} is {array.dtype} of shape {array.shape}")
+        return film
+
+
+def _ratio(numerator: NDArray, denominator: NDArray) -> Float64:
+    """Numerator over denominator, NaN where the denominator is not above zero."""
+    out = np.full(np.broadcast_shapes(numerator.shape, denominator.shape), np.nan)
+    return np.divide(numerator, denominator, out=out, where=denominator > 0)

@@ -1,0 +1,249 @@
+"""Scenes from TOML files: every key has one line here that says what it may hold."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from sss_tools.errors import InputError
+from sss_tools.loading import load_mesh
+from sss_tools.medium import UNITS
+from sss_tools.mesh import Mesh
+
+from .description import (
+    Camera,
+    DirectionalLight,
+    EnvironmentLight,
+    Light,
+    Material,
+    PointLight,
+    RectangleLight,
+    Scene,
+    SceneObject,
+    SphereLight,
+)
+from .environment_image import is_file, read_environment_image
+from .fingerprint import with_hash
+from .keys import (
+    Key,
+    Kind,
+    Place,
+    did_you_mean,
+    one_of,
+    read_keys,
+    read_variant,
+    to_colour,
+    to_number,
+    to_text,
+    to_vector,
+    to_whole_numbers,
+)
+from .materials import read_material
+from .transform import read_transform, transformed
+
+MOST_PIXELS = 2**26
+"""The film keeps some 60 bytes a pixel: 4 GB at this size, 8192 x 8192."""
+
+_ANYTHING = Kind("a table", lambda value: value)
+_POSITION = Kind("three numbers", to_vector, lambda v: v.shape == (3,))
+_DIRECTION = Kind("three numbers, not all zero", to_vector, lambda v: v.shape == (3,) and v.any())
+_LIGHT = Kind("one number or three, each 0 or more", to_colour, lambda c: (c >= 0).all())
+_HALF = Kind("[half width, half height], both above 0", to_vector, lambda h: h.shape == (2,) and h.min() > 0)
+_UPWARD = np.array([0.0, 1.0, 0.0])
+
+_FILE = {
+    "scene": Key(_ANYTHING, {}),
+    "camera": Key(_ANYTHING, None),
+    "light": Key(_ANYTHING, []),
+    "object": Key(_ANYTHING, []),
+    "material": Key(_ANYTHING, {}),
+}
+_SCENE = {"unit": Key(one_of(UNITS), "mm")}
+_CAMERA = {
+    "position": Key(_POSITION),
+    "target": Key(_POSITION),
+    "up": Key(_DIRECTION, _UPWARD),
+    "fov": Key(Kind("the vertical angle in degrees, above 0 and below 180", to_number, lambda a: 0 < a < 180)),
+    "resolution": Key(
+        Kind(f"[width, height], whole numbers from 1, at most {MOST_PIXELS} pixels", to_whole_numbers,
+             lambda r: len(r) == 2 and min(r) >= 1 and r[0] * r[1] <= MOST_PIXELS), (500, 500)),
+}  # fmt: skip
+_LIGHTS = {
+    "environment": {
+        "radiance": Key(_LIGHT, None),
+        "image": Key(Kind("the name of an image file", to_text), None),
+        "rotation": Key(Kind("an angle in degrees", to_number), 0.0),
+    },
+    "point": {"position": Key(_POSITION), "intensity": Key(_LIGHT)},
+    "directional": {"direction": Key(_DIRECTION), "irradiance": Key(_LIGHT)},
+    "rectangle": {
+        "center": Key(_POSITION),
+        "target": Key(_POSITION),
+        "up": Key(_DIRECTION, None),
+        "half": Key(_HALF),
+        "radiance": Key(_LIGHT),
+    },
+    "sphere": {
+        "center": Key(_POSITION),
+        "radius": Key(Kind("a radius above 0", to_number, lambda r: r > 0)),
+        "radiance": Key(_LIGHT),
+    },
+}
+_OBJECT = {
+    "name": Key(Kind("a name", to_text), None),
+    "mesh": Key(Kind("the name of a mesh file", to_text)),
+    "material": Key(Kind("the name of a material", to_text)),
+    "normals": Key(one_of(["flat", "smooth"]), "flat"),
+    "transform": Key(_ANYTHING, {}),
+    "shader": Key(one_of(["auto", "path", "plumb", "scalar"]), "auto"),
+    "hole_handling": Key(one_of(["auto", "strict", "cap", "terminate", "surface"]), "auto"),
+}
+
+
+def load_scene(path: str | Path) -> Scene:
+    """The scene that a TOML file describes, meshes and images included, with its hash.
+
+    Raises InputError, one line that names the file, the key and the table, for whatever cannot be rendered:
+    syntax, unknown and missing keys, values out of range, degenerate cameras and transforms, missing or
+    corrupt meshes and images, no object, no light.
+    """
+    path = Path(path)
+    document = Place(path, "the scene file")
+    tables = read_keys(_parse(path), _FILE, document)
+    if tables["camera"] is None:
+        raise document.error("missing table [camera]", 'add it with "position", "target" and "fov"')
+    unit = read_keys(tables["scene"], _SCENE, document.within("[scene]"))["unit"]
+    camera = _camera(tables["camera"], document.within("[camera]"))
+    lights = tuple(_light(table, place) for table, place in _entries(tables["light"], "light", path))
+    if not lights:
+        raise document.error("there is no [[light]], so nothing would be lit", "add one")
+    materials = _materials(tables["material"], unit, document)
+    objects = _objects(tables["object"], materials, path)
+    if not objects:
+        raise document.error("there is no [[object]], so there is nothing to render", "add one")
+    return with_hash(Scene(unit, camera, lights, objects, path=path))
+
+
+def _parse(path: Path) -> dict[str, Any]:
+    try:
+        with path.open("rb") as file:
+            return tomllib.load(file)
+    except FileNotFoundError:
+        raise InputError(path, "there is no such scene file", "check the path") from None
+    except OSError as error:
+        raise InputError(path, f"cannot be read ({error.strerror})", "give a readable TOML file") from None
+    # ValueError: syntax, text that is not UTF-8, and numbers of absurd length alike
+    except (ValueError, RecursionError) as error:
+        raise InputError(path, f"is no valid TOML: {error}", "correct the syntax") from None
+
+
+def _entries(tables: Any, name: str, path: Path) -> list[tuple[Any, Place]]:
+    """The tables of an array of tables, each with its place."""
+    if not isinstance(tables, list):
+        raise InputError(path, f"[{name}] is one table", f"write [[{name}]], for there may be several")
+    return [(table, Place(path, f"[[{name}]] {number}")) for number, table in enumerate(tables, 1)]
+
+
+def _camera(table: Any, place: Place) -> Camera:
+    camera = Camera(**read_keys(table, _CAMERA, place))
+    view = camera.target - camera.position
+    if not view.any():
+        raise place.error(f'"position" equals "target" in {place.name}', "move one of them")
+    if _parallel(view, camera.up):
+        raise place.error(f'"up" in {place.name} is parallel to the line of sight', "turn it")
+    return camera
+
+
+def _parallel(a, b) -> bool:
+    # below this angle, in radians, the roll would be left to rounding
+    a, b = a / np.abs(a).max(), b / np.abs(b).max()
+    return bool(np.linalg.norm(np.cross(a, b)) < 1e-6 * np.linalg.norm(a) * np.linalg.norm(b))
+
+
+def _light(table: Any, place: Place) -> Light:
+    kind, values = read_variant(table, _LIGHTS, place)
+    if kind == "environment":
+        return _environment(values, place)
+    if kind == "rectangle":
+        return _rectangle(values, place)
+    if kind == "point":
+        return PointLight(**values)
+    return DirectionalLight(**values) if kind == "directional" else SphereLight(**values)
+
+
+def _environment(values: dict[str, Any], place: Place) -> EnvironmentLight:
+    if (values["radiance"] is None) == (values["image"] is None):
+        found = "neither" if values["image"] is None else "both"
+        raise place.error(f'{place.name} (environment) has {found} of "radiance" and "image"', "give one of them")
+    if values["image"] is not None:
+        values["image"] = read_environment_image(place.file.parent / values["image"])
+    return EnvironmentLight(**values)
+
+
+def _rectangle(values: dict[str, Any], place: Place) -> RectangleLight:
+    view = values["target"] - values["center"]
+    if not view.any():
+        raise place.error(f'"center" equals "target" in {place.name} (rectangle)', "move one of them")
+    if values["up"] is None:
+        # a lamp overhead is no mistake where nothing was said about its roll
+        values["up"] = np.array([0.0, 0.0, 1.0]) if _parallel(view, _UPWARD) else _UPWARD
+    elif _parallel(view, values["up"]):
+        problem = f'"up" in {place.name} (rectangle) is parallel to the direction of the light'
+        raise place.error(problem, "turn it, or leave it out")
+    return RectangleLight(**{**values, "half": tuple(values["half"].tolist())})
+
+
+def _materials(tables: Any, unit: str, document: Place) -> dict[str, Material]:
+    if not isinstance(tables, dict):
+        raise InputError(document.file, "[material] is no table", "write [material.NAME]")
+    places = {name: document.within(f"[material.{name}]") for name in tables}
+    return {name: read_material(table, unit, places[name]) for name, table in tables.items()}
+
+
+def _objects(tables: Any, materials: dict[str, Material], path: Path) -> tuple[SceneObject, ...]:
+    meshes: dict[Path, Mesh] = {}
+    objects: dict[str, SceneObject] = {}
+    for table, place in _entries(tables, "object", path):
+        values = read_keys(table, _OBJECT, place)
+        mesh_path = path.parent / values["mesh"]
+        name = values["name"] or mesh_path.stem
+        if name in objects:
+            raise place.error(f'two objects have the name "{name}"', 'give each its own "name"')
+        material = values["material"]
+        if material not in materials:
+            hint = did_you_mean(material, materials) if materials else f"add [material.{material}]"
+            raise place.error(f'unknown material "{material}" in {place.name}', hint)
+        matrix = read_transform(values["transform"], place.within(f'"transform" of {place.name}'))
+        source = _mesh(mesh_path, place, meshes)
+        objects[name] = SceneObject(
+            name=name,
+            mesh=_usable(transformed(source, matrix), mesh_path, place),
+            material=materials[material],
+            mesh_path=mesh_path,
+            normals=values["normals"],
+            shader=values["shader"],
+            hole_handling=values["hole_handling"],
+            source=source,
+        )
+    return tuple(objects.values())
+
+
+def _mesh(path: Path, place: Place, meshes: dict[Path, Mesh]) -> Mesh:
+    """The mesh of a file, read once and kept in ``meshes``."""
+    if not is_file(path):
+        raise InputError(path, f"there is no such mesh, but {place.name} of {place.file} names it", "check the path")
+    file = path.resolve()
+    if file not in meshes:
+        meshes[file] = load_mesh(path)
+    return meshes[file]
+
+
+def _usable(mesh: Mesh, path: Path, place: Place) -> Mesh:
+    if len(mesh.faces) == 0:
+        raise InputError(path, f"the mesh of {place.name} has no faces", "give a mesh with triangles")
+    if not np.isfinite(mesh.vertices).all():
+        raise InputError(path, f"the mesh of {place.name} has vertices that are not finite", "repair it")
+    return mesh
