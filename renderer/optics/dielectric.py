@@ -9,14 +9,14 @@ from __future__ import annotations
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 _GRAZING = 1e-18
 """Least cosine used, so that 0/0 becomes the limit 1. Its square is still a normal float32, so that for
 ``eta = 1`` the root below returns the cosine itself, bit for bit, and the reflectance is exactly 0."""
 
 
-def fresnel_reflectance(cos_incident: NDArray, eta: ArrayLike) -> tuple[NDArray, NDArray]:
+def fresnel_reflectance(cos_incident: NDArray, eta: float | NDArray) -> tuple[NDArray, NDArray]:
     """Unpolarised reflectance of a smooth boundary, and the cosine of the refracted direction.
 
         g  = sqrt(eta^2 - 1 + c^2) = eta cos_transmitted
@@ -48,7 +48,7 @@ def fresnel_reflectance(cos_incident: NDArray, eta: ArrayLike) -> tuple[NDArray,
     return senkrecht, g
 
 
-def transmittance(cos_incident: NDArray, eta: ArrayLike) -> NDArray:
+def transmittance(cos_incident: NDArray, eta: float | NDArray) -> NDArray:
     """T = 1 - F, shaped and typed like ``cos_incident``; see ``fresnel_reflectance``."""
     return 1.0 - fresnel_reflectance(cos_incident, eta)[0]
 

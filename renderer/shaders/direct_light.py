@@ -46,7 +46,8 @@ def arriving(scene: TracedScene, position: Float32, draw) -> list[Illumination]:
     draw  called without arguments, returns two (n,) uniforms
     """
     lights = [source.illuminate(position) for source in scene.lights.points]
-    lights += [area.sample(position, *draw()) for area in (*scene.lights.rectangles, *scene.lights.spheres)]
+    lights += [rectangle.sample(position, *draw()) for rectangle in scene.lights.rectangles]
+    lights += [sphere.sample(position, *draw()) for sphere in scene.lights.spheres]
     return lights
 
 

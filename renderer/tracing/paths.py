@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
+from numpy.typing import NDArray
 
 OUTSIDE = np.int16(-1)
 
@@ -26,7 +29,7 @@ class Paths:
 
     def __init__(self, capacity: int, translucent_objects: int):
         self.capacity, self.count = capacity, 0
-        self._store = {
+        self._store: dict[str, NDArray[Any]] = {
             "origin": np.empty((3, capacity), np.float32),
             "direction": np.empty((3, capacity), np.float32),
             "throughput": np.empty((3, capacity), np.float32),

@@ -127,8 +127,18 @@ class TracedScene:
         bounds = self.frame.points_in(thing.mesh.bounds).astype(np.float32)
         shells_add_up = thing.closedness is not None and thing.closedness.state == "closed"
         first = sum(len(other.mesh.faces) for other in self.scene.objects[:index])
-        return TracedObject(index, first, medium, roughness, np.asarray(colour, np.float32).reshape(3, 1), shader, handling,
-                            shells_add_up, bounds[0][:, None], bounds[1][:, None])  # fmt: skip
+        return TracedObject(
+            index=index,
+            first_triangle=first,
+            medium=medium,
+            roughness=roughness,
+            colour=np.asarray(colour, np.float32).reshape(3, 1),
+            shader=shader,
+            hole_handling=handling,
+            shells_add_up=shells_add_up,
+            lower=bounds[0][:, None],
+            upper=bounds[1][:, None],
+        )
 
     def closest(self, origin: Float32, direction: Float32, limit: Float32 | None = None):
         """As ``RayCaster.closest``."""
@@ -212,4 +222,5 @@ def corner_normals(mesh: Mesh) -> Float32:
 
 def offset_from(position: Float32, normal: Float32, side: Float32) -> Float32:
     """(3, n) ray origins just off a surface, on the side of ``normal`` that ``side`` (n,), +1 or -1, tells."""
-    return position + (np.copysign(RAY_OFFSET, side) * normal)
+    step = np.where(side > 0, RAY_OFFSET, -RAY_OFFSET).astype(np.float32, copy=False)
+    return position + step * normal

@@ -1,0 +1,279 @@
+"""sss-render: a picture of the light in a scene, or in a bare mesh."""
+
+from __future__ import annotations
+
+import json
+import sys
+import time
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from sss_tools.errors import InputError
+
+from .clock import process_start
+from .command import ArgumentParser, complain, progress, run, unavailable, version
+
+if TYPE_CHECKING:
+    from renderer.job import Budget
+    from renderer.render import Renderer
+    from renderer.scene.description import Scene
+
+PROGRAM = "sss-render"
+LEAKS_WORTH_A_WARNING = 1e-3
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """The command. Returns the exit status: 0 written, 2 refused, 130 interrupted with what was done written."""
+    return run(PROGRAM, _render, argv)
+
+
+def _render(argv: Sequence[str] | None) -> int:
+    arguments = list(sys.argv[1:] if argv is None else argv)
+    if arguments[:1] == ["merge"]:
+        return _merge(arguments[1:])
+    started = process_start()
+    options = _parser().parse_args(arguments)
+    _refuse(options)
+
+    from renderer.job import execute, guide_arrays, report
+    from renderer.output.image import check_writable
+    from renderer.render import Renderer, Settings, Stages
+
+    check_writable(options.output)
+    if options.report is not None:
+        _check_report(options.report)
+    stages = Stages()
+    with stages.stage("load"):
+        scene = _scene(options)
+    settings = Settings(options.shader, options.hole_handling, options.quality, options.seed, options.threads)
+    budget = _budget(options, started)
+    planned = None if budget.last is None else budget.last - budget.first
+    renderer = Renderer(scene, settings, planned, stages)
+    if not options.quiet:
+        _explain(renderer)
+    for plan in renderer.plans:
+        if plan.warning:
+            complain(PROGRAM, plan.warning, "warning")
+    aovs = guide_arrays(renderer, options.aov)
+    with progress(1.0, "rendering", options.quiet) as advance:
+        shown = 0.0
+
+        def show(done: float, total: float, text: str) -> None:
+            nonlocal shown
+            share = min(done / total, 1.0)
+            advance(share - shown, text)
+            shown = share
+
+        picture = execute(renderer, options.output, budget, options.resume, aovs, show)
+    total = time.time() - started
+    _warn_of_leaks(renderer)
+    if options.report is not None:
+        text = json.dumps(report(renderer, picture, version(), total), indent=1)
+        _write_report(options.report, text)
+    if not options.quiet:
+        print(f"{options.output}: {picture.film.passes} passes in {total:.1f} s")
+    return 0
+
+
+def _parser() -> ArgumentParser:
+    parser = ArgumentParser(
+        PROGRAM,
+        description="Render a scene (TOML) or a bare mesh: check the meshes, choose a shader for each object, "
+        "follow the light.",
+        epilog="sss-render merge PART... -o OUT puts parts of one render (npz) together.",
+    )
+    parser.add_argument("scene", type=Path, metavar="SCENE.toml|MESH", help="what to render")
+    parser.add_argument("-o", "--output", type=Path, required=True, metavar="OUT", help="picture: .png, .exr or .npz")
+    parser.add_argument("--shader", choices=("auto", "path", "plumb", "scalar"), default="auto",
+                        help="one shader for all objects (default: by predicted error)")  # fmt: skip
+    parser.add_argument("--quality", type=_share, default=0.5, metavar="Q",
+                        help="0 cheapest to 1 reference, for --shader auto (default: 0.5)")  # fmt: skip
+    amount = parser.add_mutually_exclusive_group()
+    amount.add_argument("--passes", type=_positive_int, metavar="N", help="camera samples a pixel (default: 64)")
+    amount.add_argument("--time", type=_positive, metavar="S", help="seconds from start to written file")
+    amount.add_argument("--target-error", type=_positive, metavar="E",
+                        help="stop at this mean relative standard error")  # fmt: skip
+    amount.add_argument("--pass-range", type=_pass_range, metavar="A:B", help="passes A up to, not including, B")
+    parser.add_argument("--seed", type=_whole, default=0, metavar="K", help="of the random numbers (default: 0)")
+    parser.add_argument("--threads", type=_positive_int, metavar="N", help="default: one a core")
+    parser.add_argument("--scheduler", metavar="ADDRESS", help="of a cluster")
+    parser.add_argument("--size", type=_size, metavar="WxH", help="of the picture (default: the scene's, or 500x500)")
+    parser.add_argument("--material", metavar="NAME", help="preset for a bare mesh (default: marble's albedo at a "
+                        "mean free path of 2 %% of the size)")  # fmt: skip
+    parser.add_argument("--unit", choices=("mm", "cm", "m", "inch"), default="mm",
+                        help="what a unit of a bare mesh is, for --material (default: mm)")  # fmt: skip
+    parser.add_argument("--hole-handling", choices=("auto", "strict", "cap", "terminate", "surface"), default="auto",
+                        help="what happens where surface is missing (default: as the check says)")  # fmt: skip
+    parser.add_argument("--resume", action="store_true", help="go on with an unfinished render")
+    parser.add_argument("--aov", type=lambda text: text.split(","), default=[], metavar="LIST",
+                        help="further arrays for exr and npz: depth, normal")  # fmt: skip
+    parser.add_argument("--report", type=Path, metavar="FILE.json", help="what was done, and how long it took")
+    return parser
+
+
+def _refuse(options: Any) -> None:
+    """Say no to what this version does not do yet, and to options that would be ignored."""
+    if options.scheduler is not None:
+        raise unavailable("--scheduler")
+    if options.hole_handling == "cap":
+        raise unavailable("--hole-handling cap", "use terminate")
+    if options.material is not None and _is_scene(options.scene):
+        raise InputError("--material", "is for bare meshes", "set the material in the scene file")
+
+
+def _is_scene(path: Path) -> bool:
+    return path.suffix.lower() == ".toml"
+
+
+def _scene(options: Any) -> Scene:
+    """The scene asked for, or one around the bare mesh."""
+    if _is_scene(options.scene):
+        from renderer.scene.scene_file import load_scene
+
+        scene = load_scene(options.scene)
+        if options.size is not None:
+            from renderer.scene.fingerprint import with_hash
+
+            scene = with_hash(replace(scene, camera=replace(scene.camera, resolution=options.size)))
+        return scene
+    from renderer.scene.staging import stage_mesh
+    from sss_tools.loading import load_mesh
+
+    mesh = load_mesh(options.scene)
+    return stage_mesh(mesh, options.material, options.size or (500, 500), options.unit)
+
+
+def _budget(options: Any, started: float) -> Budget:
+    from renderer.job import DEFAULT_PASSES, Budget
+
+    if options.pass_range is not None:
+        first, last = options.pass_range
+        return Budget(first, last, started=started)
+    if options.time is not None or options.target_error is not None:
+        return Budget(0, None, options.time, options.target_error, started)
+    return Budget(0, options.passes or DEFAULT_PASSES, started=started)
+
+
+def _explain(renderer: Renderer) -> None:
+    """Print the verdict on each object, what is done at holes, the shader and why."""
+    for thing, plan in zip(renderer.scene.objects, renderer.plans, strict=True):
+        if plan.state is None:
+            print(f"{plan.name}: {plan.shader}")
+            continue
+        closedness = thing.closedness
+        assert closedness is not None
+        holes = f", {closedness.boundary_loops} boundary loop(s)" if closedness.boundary_loops else ""
+        print(
+            f"{plan.name}: {plan.state}{holes} ({renderer.sources[plan.name]}); hole handling {plan.hole_handling}; "
+            f"shader {plan.shader} at distance {plan.distance:.4g}: {plan.reason}"
+        )
+
+
+def _warn_of_leaks(renderer: Renderer) -> None:
+    tally = renderer.tally
+    if tally.samples and tally.leaked > LEAKS_WORTH_A_WARNING * tally.samples:
+        complain(
+            PROGRAM,
+            f"{tally.leaked} of {tally.samples} paths contradicted a surface taken for closed; check the mesh with "
+            "sss-check, or use --hole-handling terminate",
+            "warning",
+        )
+    if renderer.film.non_finite:
+        complain(PROGRAM, f"{renderer.film.non_finite} samples were not finite and are left out", "warning")
+
+
+def _check_report(path: Path) -> None:
+    """Refuse a report that cannot be written, before the hour of rendering."""
+    if path.is_dir() or not path.parent.is_dir():
+        raise InputError(path, "cannot be written: no such folder, or a folder itself", "name a file in a folder")
+    import os
+
+    if not os.access(path if path.exists() else path.parent, os.W_OK):
+        raise InputError(path, "cannot be written: write-protected", "choose another name")
+
+
+def _write_report(path: Path, text: str) -> None:
+    from sss_tools.files import write_atomically
+
+    try:
+        write_atomically(path, (text + "\n").encode())
+    except OSError as error:
+        raise InputError(path, f"cannot be written ({error.strerror})", "choose another name") from None
+
+
+def _merge(arguments: list[str]) -> int:
+    parser = ArgumentParser(f"{PROGRAM} merge", description="Put parts of one render together.")
+    parser.add_argument("parts", nargs="+", type=Path, metavar="PART", help="npz files of sss-render --pass-range")
+    parser.add_argument("-o", "--output", type=Path, required=True, metavar="OUT", help="picture: .png, .exr or .npz")
+    options = parser.parse_args(arguments)
+
+    from renderer.job import merged
+    from renderer.output import image
+
+    image.check_writable(options.output)
+    picture = merged(options.parts)
+    image.write(options.output, picture)
+    if not options.quiet:
+        print(f"{options.output}: {picture.film.passes} passes")
+    return 0
+
+
+# ---- option types: argparse turns a ValueError into "invalid VALUE" with the function's name ----
+
+
+def _positive(text: str) -> float:
+    value = float(text)
+    if not 0 < value < float("inf"):
+        raise ValueError
+    return value
+
+
+def _positive_int(text: str) -> int:
+    value = int(text)
+    if value < 1:
+        raise ValueError
+    return value
+
+
+def _whole(text: str) -> int:
+    value = int(text)
+    if value < 0:
+        raise ValueError
+    return value
+
+
+def _share(text: str) -> float:
+    value = float(text)
+    if not 0 <= value <= 1:
+        raise ValueError
+    return value
+
+
+def _size(text: str) -> tuple[int, int]:
+    width, height = (int(part) for part in text.lower().split("x"))
+    if not (0 < width <= 65536 and 0 < height <= 65536):
+        raise ValueError
+    return width, height
+
+
+def _pass_range(text: str) -> tuple[int, int]:
+    first, last = (int(part) for part in text.split(":"))
+    if not 0 <= first < last:
+        raise ValueError
+    return first, last
+
+
+for _type, _name in (
+    (_positive, "positive number"),
+    (_positive_int, "whole number above 0"),
+    (_whole, "whole number"),
+    (_share, "number from 0 to 1"),
+    (_size, "size WIDTHxHEIGHT"),
+    (_pass_range, "range A:B"),
+):
+    _type.__name__ = _name  # what argparse calls the kind of value in its message
+
+if __name__ == "__main__":
+    raise SystemExit(main())

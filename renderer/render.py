@@ -1,0 +1,201 @@
+"""From a scene and settings to a film: check, choose, build, then pass after pass."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from hashlib import blake2b
+from threading import local
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .output.film import Film
+from .output.image import Picture
+from .scene.admission import admit
+from .scene.camera import CameraRays
+from .scene.description import Scene
+from .scene.fingerprint import scene_hash
+from .shaders import FAST_SHADERS, diffuse, selection
+from .shaders.fast_body import FastBody
+from .shaders.selection import DEFAULT_QUALITY, Plan
+from .shaders.surface import BodyOptics
+from .tracing.tally import Tally
+from .tracing.traced_scene import TracedObject, TracedScene
+from .wavefront import Samples, Wavefront
+
+SHADER_ID = {"path": 0, "plumb": 1, "scalar": 2, "diffuse": 3}
+"""In pictures; opaque objects and the background have -1."""
+_UNIT_PIXELS = 32768
+"""Camera samples of a work unit: some 0.1 s of work, so that threads end together."""
+
+
+@dataclass(frozen=True)
+class Settings:
+    """What the user asks of a render.
+
+    shader, hole_handling  "auto", or one for all objects
+    quality                in [0, 1], see ``selection``
+    seed                   of the random numbers
+    threads                None: as many as there are cores
+    """
+
+    shader: str = "auto"
+    hole_handling: str = "auto"
+    quality: float = DEFAULT_QUALITY
+    seed: int = 0
+    threads: int | None = None
+
+
+@dataclass
+class Stages:
+    """Wall seconds by stage."""
+
+    seconds: dict[str, float] = field(default_factory=dict)
+
+    @contextmanager
+    def stage(self, name: str) -> Iterator[None]:
+        """Count the block's time under ``name``."""
+        start = time.perf_counter()
+        try:
+            yield
+        finally:
+            self.seconds[name] = self.seconds.get(name, 0.0) + time.perf_counter() - start
+
+
+class Renderer:
+    """A scene made ready: checked, shaders chosen, ray caster and tables built.
+
+    plans    what is done with each object, and why
+    sources  by object name, where the verdict on its mesh comes from
+    film     the passes so far
+    tally    counts over all passes of this renderer
+    stages   seconds for check, build and render
+
+    Raises InputError for a camera inside an object.
+    """
+
+    def __init__(self, scene: Scene, settings: Settings, passes: int | None = None, stages: Stages | None = None):
+        self.settings, self.stages, self.tally = settings, stages or Stages(), Tally()
+        with self.stages.stage("check"):
+            checked, self.sources = admit(scene)
+        self.plans = selection.select(checked, settings.quality, settings.shader, settings.hole_handling, passes)
+        self.scene = checked
+        with self.stages.stage("build"):
+            self.traced = TracedScene(
+                self.scene, [plan.shader for plan in self.plans], [plan.hole_handling for plan in self.plans]
+            )
+            self.camera = CameraRays(scene.camera, self.traced.frame)
+            self._fast_bodies = _fast_bodies(self.traced)
+            self.shader_id, self.object_id = self._identify()
+        self.film = Film.blank(scene.camera.resolution, planned_hash(scene, self.plans), settings.seed)
+        self._worker = local()
+
+    def run(self, passes: Iterable[int], done: Callable[[int], bool] | None = None) -> None:
+        """Add passes to the film, in the order given.
+
+        done  is told the number of each pass when it is in the film; where it returns True, no more are begun,
+              and those under way are dropped. On KeyboardInterrupt the film keeps all whole passes.
+        """
+        threads = self.settings.threads or os.cpu_count() or 1
+        width, height = self.scene.camera.resolution
+        starts = range(0, width * height, _UNIT_PIXELS)
+        begun: deque[tuple[int, list[Future[Samples]]]] = deque()
+        with self.stages.stage("render"), ThreadPoolExecutor(threads) as pool:
+            try:
+                waiting = iter(passes)
+                while True:
+                    # enough units under way that no thread waits for the slowest unit of a pass
+                    while sum(not unit.done() for _, units in begun for unit in units) < 2 * threads:
+                        index = next(waiting, None)
+                        if index is None:
+                            break
+                        units = [
+                            pool.submit(self._trace, index, start, min(start + _UNIT_PIXELS, width * height))
+                            for start in starts
+                        ]
+                        begun.append((index, units))
+                    if not begun:
+                        return
+                    index, units = begun.popleft()
+                    self._add([unit.result() for unit in units], index)
+                    if done is not None and done(index):
+                        return
+            finally:
+                for _, units in begun:
+                    for unit in units:
+                        unit.cancel()
+
+    def picture(self, seconds: float, aovs: dict[str, NDArray] | None = None) -> Picture:
+        """What is written to a file; ``seconds`` is the wall time to state in it."""
+        return Picture(self.film, seconds, self.shader_id, self.object_id, aovs or {})
+
+    def _trace(self, index: int, first: int, last: int) -> Samples:
+        wavefront = getattr(self._worker, "wavefront", None)
+        if wavefront is None:
+            wavefront = Wavefront(self.traced, self.camera, self._fast_bodies, self.settings.seed)
+            self._worker.wavefront = wavefront
+        return wavefront.trace(index, first, last)
+
+    def _add(self, units: list[Samples], index: int) -> None:
+        width, height = self.scene.camera.resolution
+        radiance = np.concatenate([unit.radiance for unit in units], axis=1).T.reshape(height, width, 3)
+        first = np.concatenate([unit.first_object for unit in units]).reshape(height, width)
+        # -1, nothing, is the last entry
+        translucent = np.array([*(thing.medium is not None for thing in self.traced.objects), False])
+        fast = np.array([*(thing.index in self._fast_bodies for thing in self.traced.objects), False])
+        self.film.add_pass(index, radiance, translucent[first], fast[first])
+        for unit in units:
+            self.tally.add(unit.tally)
+        self.tally.non_finite = self.film.non_finite
+
+    def _identify(self) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+        """Shader and object that the ray through each pixel's centre meets first, (h, w) each."""
+        width, height = self.scene.camera.resolution
+        directions = self.camera.centre_directions()
+        origins = np.repeat(self.camera.origin[:, None], directions.shape[1], axis=1)
+        _, triangle = self.traced.closest(origins, directions)
+        thing = np.where(triangle >= 0, self.traced.triangle_object[triangle], -1).astype(np.int32)
+        shaders = np.array([*(SHADER_ID.get(plan.shader, -1) for plan in self.plans), -1], np.int32)
+        return shaders[thing].reshape(height, width), thing.reshape(height, width)
+
+
+def planned_hash(scene: Scene, plans: list[Plan]) -> str:
+    """Hexadecimal digest of the scene and of what is done with its objects: samples of two films with equal hash
+    and seed may be added up."""
+    digest = blake2b(digest_size=16)
+    digest.update((scene.hash or scene_hash(scene)).encode())
+    for plan in plans:
+        digest.update(f"|{plan.shader}|{plan.hole_handling}".encode())
+    return digest.hexdigest()
+
+
+def _fast_bodies(traced: TracedScene) -> dict[int, FastBody]:
+    """What the faster shaders need, for the objects that use them and no others."""
+    media = {thing.index: thing.medium for thing in traced.objects}
+    bodies: dict[int, FastBody] = {}
+    for thing in traced.objects:
+        shader = FAST_SHADERS.get(thing.shader)
+        if shader is None or thing.medium is None:
+            continue
+        radius = float(np.linalg.norm(thing.upper - thing.lower)) / 2
+        others = {index: medium for index, medium in media.items() if index != thing.index}
+        optics = BodyOptics.prepare(thing.index, thing.medium, radius, others)
+        curvature = None
+        if shader is not diffuse:
+            curvature = _corner_curvature(traced, thing)
+            _ = optics.tables  # now, and not in every thread at once
+        bodies[thing.index] = FastBody(thing, shader, optics, traced.lights.beams(), curvature)
+    return bodies
+
+
+def _corner_curvature(traced: TracedScene, thing: TracedObject) -> NDArray[np.float32]:
+    from sss_tools.curvature import mean_curvature
+
+    mesh = traced.scene.objects[thing.index].mesh
+    return (mean_curvature(mesh)[mesh.faces] * traced.frame.scale).astype(np.float32)

@@ -1,0 +1,234 @@
+"""What the fast shaders share: surface points, a body's optics, and exitance turned into radiance.
+
+Lengths are in the scene's unit-size frame. Exitance is the power that scattered light carries out through a
+unit of surface, per colour channel.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sss_tools.medium import Medium, diffuse_reflectance
+
+from ..optics import lookup
+from ..optics.ball import BallTable, ball_table
+from ..optics.dielectric import diffuse_external_reflectance, fresnel_reflectance
+from ..optics.slab import diffusion
+
+Float32 = NDArray[np.float32]
+
+BLOCK = 8192
+"""Points worked on at a time: three rows of float32 stay below the 128 kB from which memory is fresh pages."""
+
+
+class Caster(Protocol):
+    """The whole scene as rays see it; see ``sss_tools.rays.RayCaster``.
+
+    triangle_object  (t,) int16 object of each triangle, -1 for the geometry of lights
+    triangle_normal  (3, t) float32 unit outward geometric normals
+    """
+
+    triangle_object: NDArray[np.int16]
+    triangle_normal: Float32
+
+    def closest(self, origin: Float32, direction: Float32, limit: Float32 | None = None):
+        """Distance (n,) and triangle (n,), -1 for none."""
+
+    def occluded(self, origin: Float32, direction: Float32, limit: Float32 | None = None) -> NDArray[np.bool_]:
+        """(n,) whether anything lies within ``limit``."""
+
+
+class Beam(Protocol):
+    """Light that comes from one place, or a constant environment (``ambient``) of ``radiance`` (3,)."""
+
+    @property
+    def ambient(self) -> bool:
+        """Whether the light comes from everywhere alike."""
+
+    @property
+    def radiance(self) -> Float32 | None:
+        """(3,), ambient beams only."""
+
+    def at(self, position: Float32) -> tuple[Float32, Float32, Float32]:
+        """Direction to the light (3, n), distance (n,) (inf if far), irradiance across the beam (3, n)."""
+
+
+@dataclass(frozen=True)
+class SurfacePoints:
+    """Points on one body's surface.
+
+    position   (3, n) float32
+    normal     (3, n) float32 unit length, outward
+    curvature  (n,) float32 mean curvature, 1/length, positive for a ball
+    """
+
+    position: Float32
+    normal: Float32
+    curvature: Float32
+
+    def __len__(self) -> int:
+        return self.position.shape[1]
+
+    def take(self, columns: NDArray[np.intp]) -> SurfacePoints:
+        """The points at ``columns``."""
+        return SurfacePoints(self.position.take(columns, axis=1), self.normal.take(columns, axis=1),
+                             self.curvature.take(columns))  # fmt: skip
+
+    def blocks(self) -> Iterator[tuple[slice, SurfacePoints]]:
+        """At most ``BLOCK`` points at a time, with their place."""
+        for start in range(0, len(self), BLOCK):
+            part = slice(start, min(start + BLOCK, len(self)))
+            yield part, SurfacePoints(*(np.ascontiguousarray(a[..., part], np.float32)
+                                        for a in (self.position, self.normal, self.curvature)))  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class BodyOptics:
+    """What a body does with light, made ready for lookup.
+
+    object_index     which object's triangles bound it
+    medium           coefficients per unit of the frame
+    bounding_radius  half the diagonal of its bounding box
+    depth_weights    (k,) float32 for each object of the scene: a length inside it weighs that many times the same
+                     length in this body when light passes through on its way here; infinite for opaque ones
+    """
+
+    object_index: int
+    medium: Medium
+    bounding_radius: float
+    depth_weights: Float32
+
+    @classmethod
+    def prepare(
+        cls, object_index: int, medium: Medium, bounding_radius: float, others: dict[int, Medium | None] | None = None
+    ) -> BodyOptics:
+        """The optics of object ``object_index``; tables are built or read when a shader first asks for them.
+
+        others  medium of every other object, None for opaque ones. Objects not named are taken for opaque.
+        """
+        others = others or {}
+        # one more at the end: index -1 is the geometry of lights, which is opaque
+        weights = np.full(max([object_index, *others]) + 2, np.inf, np.float32)
+        own = _mean_extinction(medium)
+        for index, other in others.items():
+            if other is not None:
+                weights[index] = _mean_extinction(other) / own
+        weights[object_index] = 1.0
+        return cls(object_index, medium, float(bounding_radius), weights)
+
+    @cached_property
+    def tables(self) -> tuple[BallTable, BallTable, BallTable]:
+        """Ball and slab of each channel."""
+        red, green, blue = (ball_table(float(a), self.ior) for a in self.medium.reduced_albedo)
+        return red, green, blue
+
+    @property
+    def ior(self) -> float:
+        """Index of refraction inside over outside."""
+        return float(self.medium.ior)
+
+    @cached_property
+    def transport_length(self) -> Float32:
+        """(3,) transport mean free paths."""
+        return np.asarray(self.medium.transport_mean_free_path, np.float32)
+
+    @cached_property
+    def diffuse_albedo(self) -> Float32:
+        """(3,) share of diffuse light that a half-space sends back, the boundary's own reflection left out."""
+        return np.asarray(diffuse_reflectance(self.medium), np.float32)
+
+    def weight_of(self, triangle_object: NDArray[np.int16]) -> Float32:
+        """(n,) ``depth_weights`` of objects by index; opaque for -1 and for objects unknown here."""
+        # as unsigned, -1 is beyond all others, and clipping leads to the last entry, which is infinite
+        return self.depth_weights.take(triangle_object.astype(np.uint16), mode="clip")
+
+    def rows(self, radius: Float32) -> list[lookup.Rows]:
+        """Table rows of each channel for radii (n,) in the frame; the same object where channels agree."""
+        octaves = lookup.octaves(radius)
+        lengths = self.transport_length
+        first = lookup.rows_at(octaves - np.log2(lengths[0]))
+        return [
+            first if channel == 0 or lengths[channel] == lengths[0] else lookup.rows_at(octaves - np.log2(length))
+            for channel, length in enumerate(lengths)
+        ]
+
+    def ball_exitance(self, x: Float32, radius: Float32) -> Float32:
+        """(3, n) B(x; R)/E0 at cosines (n,) and radii (n,) in the frame."""
+        columns = lookup.columns_at(x)
+        rows = self.rows(radius)
+        return np.stack([lookup.interpolate(t.ball, r, columns) for t, r in zip(self.tables, rows, strict=True)])
+
+    def slab_exitance(self, x: Float32, thickness: Float32) -> Float32:
+        """(3, n) exitance of the slab per irradiance, at signed cosines; see ``BallTable.slab``."""
+        columns = lookup.columns_at(x)
+        rows = self.rows(thickness * np.float32(0.5))
+        return np.stack([lookup.interpolate(t.slab, r, columns) for t, r in zip(self.tables, rows, strict=True)])
+
+    def uniform_exitance(self, radius: Float32) -> Float32:
+        """(3, n) exitance of balls under constant radiance 1."""
+        rows = self.rows(radius)
+        return np.stack([lookup.interpolate_rows(t.uniform, r) for t, r in zip(self.tables, rows, strict=True)])
+
+    def passed_on(self, before: Float32, depth: Float32) -> Float32:
+        """(3, n) share of diffuse light left when ``depth`` (n,) is added to a way of ``before`` (n,) inside.
+
+            sinh k(before + 2 z_b) / sinh k(before + depth + 2 z_b)
+
+        the flux through a layer between its extrapolated surfaces: 1/length without absorption, exponential with.
+        """
+        k, z_b = (value[:, None] for value in self._diffusion)
+        unit = self.transport_length[:, None]
+        near = k * (before / unit + 2 * z_b)
+        far = near + k * (depth / unit)
+        return np.exp(near - far) * np.expm1(-2 * near) / np.expm1(-2 * far)
+
+    def curvature_radius(self, curvature: Float32) -> Float32:
+        """(n,) 1/H, where the surface is flat or hollow the bounding radius, which bounds it everywhere."""
+        return np.reciprocal(np.maximum(curvature, np.float32(1 / self.bounding_radius)))
+
+    @cached_property
+    def _diffusion(self) -> tuple[Float32, Float32]:
+        k, z_b = diffusion(self.medium.reduced_albedo, self.medium.ior)
+        # a trace of absorption keeps 0/0 away: 1e-4 per transport length
+        return np.maximum(k, 1e-4).astype(np.float32), z_b.astype(np.float32)
+
+
+def _mean_extinction(medium: Medium) -> float:
+    return float(np.mean(medium.reduced_extinction))
+
+
+def outgoing_radiance(exitance: Float32, cos_view: Float32, ior: float) -> Float32:
+    """(3, n) radiance towards a viewer at outer cosines ``cos_view`` (n,) of scattered light.
+
+        L = B T(mu)/(pi (1 - Fe))
+
+    Inside, the light is taken for diffuse; the boundary shapes it. The integral over the hemisphere returns B.
+    """
+    reflectance, _ = fresnel_reflectance(cos_view, ior)
+    shape = 1 - reflectance
+    shape *= 1 / (np.pi * (1 - diffuse_external_reflectance(float(ior))))
+    return exitance * shape
+
+
+def sum_in_blocks(
+    points: SurfacePoints, beams: Iterable[Beam], shade: Callable[[SurfacePoints, Beam], Float32]
+) -> Float32:
+    """(3, n) float32 sum over beams of ``shade(block, beam)``, a block of points at a time."""
+    beams = list(beams)
+    total = np.zeros((3, len(points)), np.float32)
+    for part, block in points.blocks():
+        for beam in beams:
+            total[:, part] += shade(block, beam)
+    return total
+
+
+def cosine_to(normal: Float32, direction: Float32) -> Float32:
+    """(n,) x = N.L, kept within [-1, 1]."""
+    x = np.einsum("ij,ij->j", normal, direction)
+    return np.clip(x, -1, 1, out=x)
