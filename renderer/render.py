@@ -190,7 +190,7 @@ def _fast_bodies(traced: TracedScene) -> dict[int, FastBody]:
         if shader is not diffuse:
             curvature = _corner_curvature(traced, thing)
             _ = optics.tables  # now, and not in every thread at once
-        bodies[thing.index] = FastBody(thing, shader, optics, traced.lights.beams(), curvature)
+        bodies[thing.index] = FastBody(thing, shader, optics, curvature)
     return bodies
 
 

@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from .scene.beams import beams
 from .scene.camera import CameraRays
 from .shaders.fast_body import FastBody
 from .shaders.opaque import meet_diffuse, meet_mirror
@@ -72,6 +73,7 @@ class Wavefront:
         paths, count = self._paths, last_pixel - first_pixel
         result = Samples(np.zeros((3, count), np.float32), np.full(count, NOTHING))
         self._first_unknown = np.ones(count, bool)
+        self._beams = beams(self.scene.lights, pass_index) if self._fast_bodies else []
         paths.clear()
         emitted = 0
         while True:
@@ -157,7 +159,9 @@ class Wavefront:
             elif kind == "mirror":
                 meet_mirror(scene, paths, who, faces)
             else:
-                self._fast_bodies[k].meet(scene, paths, who, faces, self._uniforms, self._tally, result.radiance)
+                self._fast_bodies[k].meet(
+                    scene, paths, who, faces, self._beams, self._uniforms, self._tally, result.radiance
+                )
         if scene.lights.rectangles:
             here = np.flatnonzero(thing < 0)
             self._meet_rectangles(index[here], triangle[here], result)

@@ -179,42 +179,6 @@ class SphereSource:
         return Illumination(direction, reach, self.radiance * (np.float32(2 * np.pi) * spread))
 
 
-@dataclass(frozen=True)
-class Beam:
-    """A share of the scene's light that comes from one place, for shaders that take no random samples.
-
-    ambient   a constant environment: ``radiance`` from everywhere, and ``at`` must not be called
-    radiance  (3,) float32, ambient beams only
-    """
-
-    source: PointSource | DirectionalSource | RectanglePart | None = None
-    radiance: Float32 | None = None
-
-    @property
-    def ambient(self) -> bool:
-        """Whether the light comes from everywhere alike."""
-        return self.source is None
-
-    def at(self, position: Float32) -> tuple[Float32, Float32, Float32]:
-        """Direction to the light (3, n), distance (n,), irradiance across the beam (3, n) at ``position`` (3, n)."""
-        assert self.source is not None, "an ambient beam comes from everywhere"
-        light = self.source.illuminate(position)
-        return light.direction, light.distance, np.broadcast_to(light.irradiance, position.shape)
-
-
-class RectanglePart:
-    """A part of a rectangle shrunk to its centre, with the cosine of emission."""
-
-    def __init__(self, center: Float32, normal: Float32, intensity: Float32):
-        self.center, self.normal, self.intensity = center, normal, intensity
-
-    def illuminate(self, position: Float32) -> Illumination:
-        """What arrives at ``position`` (3, n)."""
-        light = _from_point(self.center, position, self.intensity)
-        emitted = np.maximum(-np.einsum("ij,ik->k", self.normal, light.direction), 0)
-        return Illumination(light.direction, light.distance, light.irradiance * emitted)
-
-
 class LightSet:
     """All lights of a scene, in its frame, by what one can do with them."""
 
@@ -239,42 +203,6 @@ class LightSet:
         for environment in self.environments:
             total += environment.radiance(direction)
         return total
-
-    def beams(self, rectangle_parts: int = 2, environment_directions: int = 48) -> list[Beam]:
-        """A fixed quadrature of all lights.
-
-        rectangle_parts         parts along each side of a rectangle
-        environment_directions  directions that stand for an environment image; a constant one is one ambient beam
-        """
-        beams = [Beam(source) for source in self.points]
-        for rectangle in self.rectangles:
-            share = (np.arange(rectangle_parts, dtype=np.float32) * 2 + 1) / rectangle_parts - 1
-            intensity = rectangle.radiance * np.float32(rectangle.area / rectangle_parts**2)
-            beams += [
-                Beam(RectanglePart(rectangle.center + a * rectangle.sides[0] + b * rectangle.sides[1],
-                                   rectangle.normal, intensity))
-                for a in share for b in share
-            ]  # fmt: skip
-        for sphere in self.spheres:
-            intensity = sphere.radiance * np.float32(np.pi * sphere.radius**2)
-            beams.append(Beam(PointSource(sphere.center, intensity)))
-        for environment in self.environments:
-            if environment.constant is not None:
-                beams.append(Beam(radiance=environment.constant[:, 0]))
-            else:
-                beams += _environment_beams(environment, environment_directions)
-        return beams
-
-
-def _environment_beams(environment: Environment, count: int) -> list[Beam]:
-    """Directions spread evenly (a Fibonacci lattice), each with the mean radiance of the directions nearest to it."""
-    centres = fibonacci_directions(count)
-    samples = fibonacci_directions(256 * count)
-    nearest = np.argmax(centres.T @ samples, axis=0)
-    seen = environment.radiance(samples)
-    totals = np.stack([np.bincount(nearest, channel, count) for channel in seen])
-    irradiance = totals * (4 * np.pi / samples.shape[1])
-    return [Beam(DirectionalSource(_column(centres[:, k]), _column(irradiance[:, k]))) for k in range(count)]
 
 
 def fibonacci_directions(count: int) -> Float32:

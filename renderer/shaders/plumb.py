@@ -33,11 +33,6 @@ the shading normal."""
 CHORD_COUNTS = 0.05, 0.15
 """|x| below which the curvature radius alone is used, chords being noisy there, and above which the chord alone."""
 
-AMBIENT_AXES: Float32 = (np.array([[1, 1, 1, -1], [1, 1, -1, 1], [1, -1, 1, 1]]) / np.sqrt(3)).astype(np.float32)
-"""(3, 4) diagonals of a cube: with their opposites, eight directions for light from everywhere. Both directions of
-an axis share one chord. On the Stanford bunny this is within 7 to 11 % (root mean square) of two hundred directions;
-three axes are within 8 to 14 %, the icosahedron's six within 5 to 9 % for half as much time again."""
-
 _FAR_SIDE_COUNTS = np.float32(0.01)
 """What comes through the body from the far end of an axis is not followed there below this share of the near end's."""
 
@@ -49,7 +44,8 @@ def exitance(caster: Caster, points: SurfacePoints, body: BodyOptics, beams: Ite
 
 def _shade(caster: Caster, points: SurfacePoints, body: BodyOptics, beam: Beam) -> Float32:
     if beam.ambient:
-        return _ambient(caster, points, body) * np.asarray(beam.radiance, np.float32)[:, None]
+        assert beam.axes is not None
+        return _ambient(caster, points, body, beam.axes) * np.asarray(beam.radiance, np.float32)[:, None]
     direction, distance, irradiance = beam.at(points.position)
     x = cosine_to(points.normal, direction)
     towards = _towards(caster, points, body, direction, distance, x)
@@ -130,7 +126,7 @@ def solved_body(body: BodyOptics, x: Float32, radius: Float32, curvature: Float3
     return ball
 
 
-def _ambient(caster: Caster, points: SurfacePoints, body: BodyOptics) -> Float32:
+def _ambient(caster: Caster, points: SurfacePoints, body: BodyOptics, axes: Float32) -> Float32:
     """(3, n) exitance under radiance 1 from everywhere.
 
     A few directions k tell how the body differs from one ball and what stands before it; what the ball itself
@@ -138,11 +134,14 @@ def _ambient(caster: Caster, points: SurfacePoints, body: BodyOptics) -> Float32
 
         U(R) sum_k B_k arriving_k / sum_k B(x_k; R),
 
-    so that a free ball is exact whatever the number of directions.
+    so that a free ball is exact whatever the number of directions. Both directions of an axis share one chord. Three
+    axes are within 8 to 14 % (root mean square) of two hundred on the Stanford bunny, and differ from pass to pass.
+
+    axes  (3, k) unit columns
     """
     n = len(points)
     found, cosines, radii = np.zeros((3, n), np.float32), [], []
-    for axis in AMBIENT_AXES.T:
+    for axis in axes.T:
         x = np.einsum("i,ij->j", axis, points.normal)
         outward = axis[:, None] * np.where(x < 0, np.float32(-1), np.float32(1))
         np.abs(x, out=x)

@@ -55,6 +55,10 @@ class Beam(Protocol):
     def radiance(self) -> Float32 | None:
         """(3,), ambient beams only."""
 
+    @property
+    def axes(self) -> Float32 | None:
+        """(3, k) directions to probe an ambient beam with."""
+
     def at(self, position: Float32) -> tuple[Float32, Float32, Float32]:
         """Direction to the light (3, n), distance (n,) (inf if far), irradiance across the beam (3, n)."""
 

@@ -60,6 +60,7 @@ class Ambient:
     """The same radiance from everywhere."""
 
     ambient = True
+    axes = (np.array([[1, 1, 1, -1], [1, 1, -1, 1], [1, -1, 1, 1]]) / np.sqrt(3)).astype(np.float32)
 
     def __init__(self, radiance=(1, 1, 1)):
         self.radiance = np.asarray(radiance, np.float32)

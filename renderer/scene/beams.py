@@ -1,0 +1,120 @@
+"""All lights as a few beams, for shaders that take no random samples: other ones in each pass.
+
+Within a pass every point sees the same beams, so a single pass has no noise. From pass to pass the points on area
+lights and the directions for environments move along sequences that fill their ranges evenly, so passes converge
+to the whole light: soft shadows for the price of one hard one.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .lights import (
+    DirectionalSource,
+    Environment,
+    Illumination,
+    LightSet,
+    PointSource,
+    RectangleSource,
+    fibonacci_directions,
+)
+
+Float32 = NDArray[np.float32]
+
+IMAGE_DIRECTIONS = 8
+"""Beams that stand for an environment image in one pass."""
+
+_CELL_SAMPLES = 256 * IMAGE_DIRECTIONS
+_STEPS_2 = np.array([0.7548776662466927, 0.5698402909980532])
+_STEPS_3 = np.array([0.8191725133961645, 0.6710436067037893, 0.5497004779019703])
+"""Roberts' sequences in two and three dimensions: multiples, modulo 1, of the powers of 1/rho with rho^3 = rho + 1 and
+rho^4 = rho + 1 (Roberts 2018, "The unreasonable effectiveness of quasirandom sequences")."""
+
+
+@dataclass(frozen=True)
+class Beam:
+    """Light from one place, or a constant environment (``ambient``).
+
+    radiance  (3,) float32, ambient beams only
+    axes      (3, 3) float32, ambient beams only: three directions across each other, to probe with
+    """
+
+    source: PointSource | DirectionalSource | RectanglePoint | None = None
+    radiance: Float32 | None = None
+    axes: Float32 | None = None
+
+    @property
+    def ambient(self) -> bool:
+        """Whether the light comes from everywhere alike."""
+        return self.source is None
+
+    def at(self, position: Float32) -> tuple[Float32, Float32, Float32]:
+        """Direction to the light (3, n), distance (n,), irradiance across the beam (3, n) at ``position`` (3, n)."""
+        assert self.source is not None, "an ambient beam comes from everywhere"
+        light = self.source.illuminate(position)
+        return light.direction, light.distance, np.broadcast_to(light.irradiance, position.shape)
+
+
+class RectanglePoint:
+    """A point of a rectangle light that sends out all of its light, with the cosine of emission."""
+
+    def __init__(self, rectangle: RectangleSource, share: NDArray[np.float64]):
+        across, upward = (2 * share - 1).astype(np.float32)
+        self._position = rectangle.center + across * rectangle.sides[0] + upward * rectangle.sides[1]
+        self._point = PointSource(self._position, rectangle.radiance * np.float32(rectangle.area))
+        self._normal = rectangle.normal
+
+    def illuminate(self, position: Float32) -> Illumination:
+        """What arrives at ``position`` (3, n)."""
+        light = self._point.illuminate(position)
+        emitted = np.maximum(-np.einsum("ij,ik->k", self._normal, light.direction), 0)
+        return Illumination(light.direction, light.distance, light.irradiance * emitted)
+
+
+def beams(lights: LightSet, pass_index: int) -> list[Beam]:
+    """The beams of one pass. Pass 0 looks at the middle of area lights."""
+    share = (0.5 + pass_index * _STEPS_2) % 1
+    turned = rotation((np.array([0.25, 0.5, 0.0]) + pass_index * _STEPS_3) % 1)
+    found = [Beam(source) for source in lights.points]
+    found += [Beam(RectanglePoint(rectangle, share)) for rectangle in lights.rectangles]
+    for sphere in lights.spheres:
+        # seen from outside a shining ball is a point of this intensity
+        found.append(Beam(PointSource(sphere.center, sphere.radiance * np.float32(np.pi * sphere.radius**2))))
+    for environment in lights.environments:
+        if environment.constant is not None:
+            found.append(Beam(radiance=environment.constant[:, 0], axes=turned))
+        else:
+            found += _image_beams(environment, turned)
+    return found
+
+
+def rotation(share: NDArray[np.float64]) -> Float32:
+    """(3, 3) rotation for three numbers in [0, 1), uniform over rotations where they are uniform.
+
+    By a unit quaternion: Shoemake 1992, "Uniform random rotations", Graphics Gems III, p. 129.
+    """
+    radii = np.sqrt(1 - share[0]), np.sqrt(share[0])
+    x, y = radii[0] * np.sin(2 * np.pi * share[1]), radii[0] * np.cos(2 * np.pi * share[1])
+    z, w = radii[1] * np.sin(2 * np.pi * share[2]), radii[1] * np.cos(2 * np.pi * share[2])
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+        ],
+        np.float32,
+    )
+
+
+def _image_beams(environment: Environment, turned: Float32) -> list[Beam]:
+    """Directions spread evenly, each with all light from the directions that are nearest to it."""
+    centres = turned @ fibonacci_directions(IMAGE_DIRECTIONS)
+    samples = fibonacci_directions(_CELL_SAMPLES)
+    nearest = np.argmax(centres.T @ samples, axis=0)
+    seen = environment.radiance(samples)
+    totals = np.stack([np.bincount(nearest, channel, IMAGE_DIRECTIONS) for channel in seen])
+    irradiance = (totals * (4 * np.pi / _CELL_SAMPLES)).astype(np.float32)
+    return [Beam(DirectionalSource(centres[:, k : k + 1], irradiance[:, k : k + 1])) for k in range(IMAGE_DIRECTIONS)]
