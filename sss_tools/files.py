@@ -10,9 +10,14 @@ from pathlib import Path
 def write_atomically(path: str | Path, data: bytes) -> None:
     """Write ``data`` beside ``path`` and move it there, so that nobody ever reads half a file.
 
-    A link is followed. What is no regular file (a terminal, a pipe, /dev/stdout) is written to directly.
+    A link is followed. What is no regular file (a terminal, a pipe) and what lies below /dev (/dev/stdout may
+    lead to a file that others hold open) is written to directly.
     Raises OSError where that is not possible; an existing file is then unchanged.
     """
+    if Path(path).is_absolute() and Path(path).parts[1:2] == ("dev",):
+        with Path(path).open("ab") as file:
+            file.write(data)
+        return
     path = Path(os.path.realpath(path))
     if path.exists() and not path.is_file():
         path.write_bytes(data)

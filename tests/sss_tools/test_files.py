@@ -1,5 +1,7 @@
 import os
 import stat
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -40,3 +42,14 @@ def test_a_link_is_followed(tmp_path):
 def test_the_null_device_is_written_to_and_stays():
     write_atomically(os.devnull, b"gone")
     assert not Path(os.devnull).is_file()
+
+
+def test_a_device_that_leads_to_an_open_file_adds_to_that_file(tmp_path):
+    code = (
+        f"import sys; sys.path[:0] = {sys.path!r}; from sss_tools.files import write_atomically;"
+        "print('before', flush=True); write_atomically('/dev/stdout', b'report\\n')"
+    )
+    with (tmp_path / "out").open("wb") as out:
+        subprocess.run([sys.executable, "-c", code], stdout=out, check=True)
+        assert os.fstat(out.fileno()).st_nlink == 1  # not replaced by another file
+    assert (tmp_path / "out").read_text() == "before\nreport\n"

@@ -1,0 +1,28 @@
+"""sss-chart: speed against accuracy, and stability. Not part of this version yet."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+
+from .command import ArgumentParser, complain, run
+
+PROGRAM = "sss-chart"
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """The command; it says that it is not there yet, and returns 2."""
+    return run(PROGRAM, _refuse, argv)
+
+
+def _refuse(argv: Sequence[str] | None) -> int:
+    parser = ArgumentParser(
+        PROGRAM, description="Speed against accuracy, and stability (not part of this version yet)."
+    )
+    parser.parse_known_args(argv)
+    complain(PROGRAM, "charts are not part of this version yet")
+    return 2
+
+
+if __name__ == "__main__":
+    sys.exit(main())

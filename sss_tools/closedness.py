@@ -1,0 +1,329 @@
+"""How closed a mesh is: its components and what each is for, its holes, and what to do at them.
+
+Closed is a property of the solid, not of the file: a UV seam is no hole, a cavity is legitimate, a sheet
+beside a solid takes nothing from it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass, fields
+from functools import cached_property
+from itertools import pairwise
+from typing import Any, Literal, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .interior import Interior, Shell, find_interior, winding_in_shells
+from .mesh import Mesh
+from .patches import orient_consistently, patch_of_face
+from .topology import Topology
+from .winding import deepest_points, spread_by_area, winding_numbers
+
+State = Literal["closed", "holes", "open"]
+Handling = Literal["strict", "cap", "terminate", "surface"]
+Role = Literal["solid", "cavity", "internal", "sheet"]
+
+ENCLOSES = 0.75
+"""Least winding number, somewhere well inside, of a surface with holes that still encloses a volume."""
+
+FLAT = 1e-3
+"""A closed component whose volume is below this share of area times diagonal is looked at for what it encloses:
+two sheets back to back are closed, too."""
+
+
+@dataclass(frozen=True)
+class Hole:
+    """One boundary loop of a component that encloses volume.
+
+    edges      how many boundary edges it has
+    perimeter  their length, mesh units
+    area       of the loop: the size of its vector area, square mesh units; exact for a flat loop
+    diameter   greatest distance between two of its points, mesh units
+    centroid   mean of its edges weighted by length, mesh units
+    """
+
+    edges: int
+    perimeter: float
+    area: float
+    diameter: float
+    centroid: tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class Component:
+    """Faces connected through edges.
+
+    faces   how many
+    role    solid; cavity (a void in a solid); internal (inside a solid, no cavity); sheet (encloses nothing)
+    closed  no boundary edge after an exact weld
+    volume  signed, cubic mesh units, negative where the normals point inwards (as a cavity's must): the
+            volumes of all components add up to the mesh's. None where it is not closed
+    """
+
+    faces: int
+    role: Role
+    closed: bool
+    volume: float | None
+
+
+@dataclass(frozen=True)
+class Closedness:
+    """The verdict on a mesh; the fields are those of the JSON object ``closedness``.
+
+    state               the worst among components that enclose volume; ``open`` where none does
+    watertight          every edge has exactly two faces
+    manifold            no edge has more than two faces, and no point joins several fans
+    oriented            neighbours agree, and the normals of solids point outwards
+    internal_geometry   surface found inside a solid that bounds no cavity
+    self_intersecting   None where nobody looked
+    boundary_loops      connected components of the graph of boundary edges, in the whole file
+    holes               the loops of components that enclose volume
+    hole_area_fraction  area of the holes over the mesh's area
+    hole_handling       what a renderer should do at them
+    """
+
+    state: State
+    watertight: bool
+    manifold: bool
+    oriented: bool
+    internal_geometry: bool
+    self_intersecting: bool | None
+    boundary_loops: int
+    holes: tuple[Hole, ...]
+    hole_area_fraction: float
+    hole_handling: Handling
+
+    def to_json(self) -> dict[str, Any]:
+        """As CONTRACTS section 2 has it: plain numbers, lists and strings."""
+        return asdict(self)
+
+    @classmethod
+    def from_json(cls, data: dict[str, Any]) -> Closedness:
+        """The inverse of ``to_json``. Raises KeyError, TypeError or ValueError for anything else."""
+        values = {field.name: data[field.name] for field in fields(cls)}
+        values["holes"] = tuple(Hole(**{**hole, "centroid": tuple(hole["centroid"])}) for hole in values["holes"])
+        if values["state"] not in get_args(State) or values["hole_handling"] not in get_args(Handling):
+            raise ValueError(f"no such state or handling: {values['state']}, {values['hole_handling']}")
+        return cls(**values)
+
+
+@dataclass(frozen=True)
+class Assessment:
+    """A verdict and what it rests on.
+
+    components          one for each of the topology's components, in its order
+    inverted            (c,) whether a component is a solid whose normals point inwards
+    loop_is_hole        (l,) whether each of the topology's boundary loops bounds a hole
+    interior            what lies inside solids
+    component_of_face   (m,) as in the topology
+    """
+
+    closedness: Closedness
+    components: tuple[Component, ...]
+    inverted: NDArray[np.bool_]
+    loop_is_hole: NDArray[np.bool_]
+    interior: Interior
+    component_of_face: NDArray[np.int64]
+
+    @property
+    def volume(self) -> float | None:
+        """Signed volume of a closed mesh, cubic mesh units; None where the mesh is not closed."""
+        if self.closedness.state != "closed":
+            return None
+        return float(sum(component.volume or 0.0 for component in self.components))
+
+    def faces_of(self, components) -> NDArray[np.int64]:
+        """Faces of the components with these numbers, in file order."""
+        return np.flatnonzero(np.isin(self.component_of_face, components))
+
+
+def assess(mesh: Mesh) -> Assessment:
+    """Find the components, their roles and holes, and decide how closed the mesh is.
+
+    Raises ValueError for a mesh without faces or with coordinates that are not finite.
+    """
+    if len(mesh.faces) == 0:
+        raise ValueError("a mesh without faces is neither open nor closed")
+    if not np.isfinite(mesh.vertices[mesh.faces]).all():
+        raise ValueError("closedness needs finite coordinates")
+    topology = mesh.topology
+    parts = _Parts(topology)
+    roles, inverted = _roles(parts)
+    components = tuple(
+        Component(len(faces), role, bool(closed), float(volume) if closed else None)
+        for faces, role, closed, volume in zip(parts.groups, roles, parts.closed, parts.volumes, strict=True)
+    )
+    interior = _interior(parts)
+    loop_is_hole = np.array(
+        [parts.encloses[parts.component_of_edge[loop[0]]] for loop in topology.boundary_loops], bool
+    )
+    loops = [loop for loop, hole in zip(topology.boundary_loops, loop_is_hole, strict=True) if hole]
+    directed = _directed_edges(topology)
+    holes = tuple(_measure(topology.points[directed[loop]]) for loop in loops)
+    manifold = len(topology.nonmanifold_edges) == 0 and len(topology.pinched_points) == 0
+    oriented = len(topology.misoriented_edges) == 0 and not inverted.any()
+    internal = bool(interior) or "internal" in roles
+    state: State = "open" if not parts.encloses.any() else "holes" if holes else "closed"
+    closedness = Closedness(
+        state=state,
+        watertight=bool(len(topology.edges)) and bool((topology.faces_per_edge == 2).all()),
+        manifold=manifold,
+        oriented=oriented,
+        internal_geometry=internal,
+        self_intersecting=None,
+        boundary_loops=len(topology.boundary_loops),
+        holes=holes,
+        hole_area_fraction=sum(hole.area for hole in holes) / mesh.area if holes else 0.0,
+        hole_handling=_handling(
+            state, manifold and oriented and not internal, all(_is_simple(topology, loop) for loop in loops)
+        ),
+    )
+    return Assessment(closedness, components, inverted, loop_is_hole, interior, topology.component_of_face)
+
+
+def _handling(state: State, flawless: bool, simple_loops: bool) -> Handling:
+    """What to do at holes, from the state and the flags."""
+    if state == "open":
+        return "surface"
+    if state == "holes":
+        return "cap" if simple_loops else "terminate"
+    return "strict" if flawless else "terminate"
+
+
+class _Parts:
+    """The components with their measures, one array entry each."""
+
+    def __init__(self, topology: Topology):
+        self.topology = topology
+        self.points = topology.points
+        self.faces, _ = orient_consistently(topology)
+        component = topology.component_of_face
+        self.count = topology.component_count
+        order = np.argsort(component, kind="stable")
+        order = order[np.searchsorted(component[order], 0) :]
+        starts = np.searchsorted(component[order], np.arange(self.count + 1))
+        self.groups = [order[a:b] for a, b in pairwise(starts)]
+
+        sides = topology.face_edges[topology.live]
+        self.component_of_edge = np.zeros(len(topology.edges), np.int64)
+        self.component_of_edge[sides] = component[topology.live][:, None]
+        open_sides = np.bincount(self.component_of_edge[topology.boundary_edges], minlength=self.count)
+        self.closed = open_sides == 0
+
+        self.lower, self.upper = np.empty((self.count, 3)), np.empty((self.count, 3))
+        self.volumes, self.areas = np.empty(self.count), np.empty(self.count)
+        for number, group in enumerate(self.groups):
+            corners = self.points[self.faces[group]]
+            box = corners.reshape(-1, 3)
+            self.lower[number], self.upper[number] = box.min(axis=0), box.max(axis=0)
+            vectors = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+            # about the middle: far from the origin the tetrahedra would cancel to nothing
+            first = corners[:, 0] - (self.lower[number] + self.upper[number]) / 2
+            self.volumes[number] = np.einsum("ij,ij->", first, vectors) / 6
+            self.areas[number] = np.linalg.norm(vectors, axis=1).sum() / 2
+        self.sign = np.sign(self.volumes)
+        self.encloses = np.array([self._encloses(number) for number in range(self.count)], bool)
+
+    def _encloses(self, number: int) -> bool:
+        """Whether a component bounds a volume; settles its sign where the volume does not."""
+        scale = self.areas[number] * np.linalg.norm(self.upper[number] - self.lower[number])
+        if self.closed[number] and abs(self.volumes[number]) > FLAT * scale:
+            return True
+        # two triangles enclose nothing; neither does what has no extent
+        if len(self.groups[number]) < 3 or scale <= 0:
+            return False
+        faces = self.faces[self.groups[number]]
+        winding = winding_numbers(deepest_points(self.points, faces), self.points, faces)
+        deepest = winding[np.argmax(np.abs(winding))] if len(winding) else 0.0
+        if abs(deepest) < ENCLOSES:
+            return False
+        self.sign[number] = np.sign(deepest)
+        return True
+
+    @cached_property
+    def shells(self) -> list[Shell]:
+        """The components that enclose volume."""
+        return [
+            Shell(self.faces[self.groups[number]], self.lower[number], self.upper[number])
+            for number in np.flatnonzero(self.encloses)
+        ]
+
+
+def _roles(parts: _Parts) -> tuple[list[Role], NDArray[np.bool_]]:
+    """The role of each component, and which are solids turned inside out.
+
+    What counts is how the *other* enclosing components wind round a component: with its own orientation it
+    bounds a void (opposite signs) or lies in matter (equal signs).
+    """
+    roles: list[Role] = ["sheet"] * parts.count
+    inverted = np.zeros(parts.count, bool)
+    numbers = np.flatnonzero(parts.encloses)
+    for number in numbers:
+        apart = (parts.lower[numbers] > parts.upper[number]) | (parts.upper[numbers] < parts.lower[number])
+        around = ~apart.any(axis=1) & (numbers != number)
+        others = [parts.shells[index] for index in np.flatnonzero(around)]
+        group = parts.groups[number]
+        # a few centroids, and their majority: others may touch this component or cut through it
+        chosen = group[spread_by_area(np.ones(len(group)), 5)]
+        samples = parts.points[parts.faces[chosen]].mean(axis=1)
+        outside = float(np.median(winding_in_shells(samples, parts.points, others))) if others else 0.0
+        if abs(outside) < 0.5:
+            roles[number] = "solid"
+            inverted[number] = parts.sign[number] < 0
+        else:
+            roles[number] = "cavity" if outside * parts.sign[number] < 0 else "internal"
+    return roles, inverted
+
+
+def _interior(parts: _Parts) -> Interior:
+    """What lies inside solids; nothing can where a single closed manifold component is all there is."""
+    if parts.count < 2 and len(parts.topology.nonmanifold_edges) == 0:
+        return Interior()
+    return find_interior(
+        parts.points,
+        parts.faces,
+        patch_of_face(parts.topology),
+        parts.shells,
+        parts.topology.component_of_face,
+    )
+
+
+def _is_simple(topology: Topology, loop: NDArray[np.int64]) -> bool:
+    """Whether boundary edges form one closed curve that runs through each of its points once."""
+    _, uses = np.unique(topology.edges[loop], return_counts=True)
+    return len(loop) >= 3 and bool((uses == 2).all())
+
+
+def _measure(ends: NDArray[np.float64]) -> Hole:
+    """Size and place of the hole bounded by edges with the end points (k, 2, 3)."""
+    lengths = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+    perimeter = float(lengths.sum())
+    centroid = (lengths / perimeter) @ ends.mean(axis=1)
+    spokes = ends - centroid
+    vector_area = np.cross(spokes[:, 0], spokes[:, 1]).sum(axis=0) / 2
+    return Hole(
+        edges=len(ends),
+        perimeter=perimeter,
+        area=float(np.linalg.norm(vector_area)),
+        diameter=_diameter(spokes[:, 0]),
+        centroid=(float(centroid[0]), float(centroid[1]), float(centroid[2])),
+    )
+
+
+def _directed_edges(topology: Topology) -> NDArray[np.int64]:
+    """(e, 2) point pairs of all edges; a boundary edge runs the way its face does."""
+    edges = topology.edges[:, ::-1].copy()
+    forward = topology.face_edges[topology.side_direction]
+    edges[forward] = topology.edges[forward]
+    return edges
+
+
+def _diameter(points: NDArray[np.float64]) -> float:
+    """Greatest distance between two of (k, 3) points; of every so many where they are thousands."""
+    points = points[:: len(points) // 2048 + 1]
+    square = 0.0
+    for start in range(0, len(points), 256):
+        difference = points[start : start + 256, None] - points[None]
+        square = max(square, float(np.einsum("psi,psi->ps", difference, difference).max()))
+    return float(np.sqrt(square))

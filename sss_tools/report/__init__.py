@@ -1,0 +1,1 @@
+"""What a check found, as text: in full, one line a finding, or JSON."""

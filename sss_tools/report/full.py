@@ -1,0 +1,113 @@
+"""The report for people: each finding with its place, what it does to the light, and what helps."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+from ..validation.outcome import FixSafety, MeshReport, Outcome, RuleReport, Severity
+
+_STATES = {
+    "closed": "closed",
+    "holes": "encloses a volume, but has holes",
+    "open": "open: encloses nothing, so no light can scatter in it",
+}
+_HANDLINGS = {
+    "strict": "strict: nothing to make up for",
+    "cap": "cap: light is kept in at the holes",
+    "terminate": "terminate: paths that get lost end there",
+    "surface": "surface: shaded as an opaque surface",
+}
+_FIXES = {
+    FixSafety.SAFE: "a safe fix keeps the shape",
+    FixSafety.UNSAFE: "a fix may change the shape",
+    FixSafety.NONE: "no automatic fix",
+}
+_SHOWN = 6
+
+
+def render(reports: Sequence[MeshReport], verbose: bool = False) -> str:
+    """All meshes one after the other; ``verbose`` lists the rules that passed, too."""
+    return "\n".join(section(report, verbose) for report in reports)
+
+
+def section(report: MeshReport, verbose: bool = False) -> str:
+    """One mesh."""
+    lines = [f"{report.path}: {_headline(report)}"]
+    if report.closedness is not None:
+        lines += _verdict(report)
+    elif report.error is not None:
+        lines.append(f"  {report.error.removeprefix(f'{report.path}: ')}")
+    for rule in report.findings:
+        lines += _finding(rule)
+    lines += _not_run(report)
+    if verbose:
+        passed = [f"{rule.code} {rule.name}" for rule in report.rules if rule.outcome == Outcome.PASS]
+        lines.append(f"  passed: {', '.join(passed) or 'nothing'}")
+        lines.append(f"  {report.seconds:.2f} s")
+    return "\n".join(lines) + "\n"
+
+
+def _headline(report: MeshReport) -> str:
+    if report.status != "ok" and not report.findings:
+        return "not checked"
+    if report.status != "ok":
+        return "unreadable"
+    counts = [(sum(rule.severity == severity for rule in report.findings), severity) for severity in Severity]
+    tally = ", ".join(f"{count} {severity}{'s' * (count > 1)}" for count, severity in counts if count)
+    return f"{report.vertices} vertices, {report.faces} faces: {tally or 'no findings'}"
+
+
+def _verdict(report: MeshReport) -> list[str]:
+    closedness = report.closedness or {}
+    roles = [part["role"] for part in report.components]
+    parts = ", ".join(
+        f"{roles.count(role)} {role}" for role in ("solid", "cavity", "internal", "sheet") if role in roles
+    )
+    return [
+        f"  {_STATES[closedness['state']]} (components: {parts or 'none'})",
+        f"  hole handling {_HANDLINGS[closedness['hole_handling']]}",
+    ]
+
+
+def _finding(rule: RuleReport) -> list[str]:
+    lines = [f"  {rule.severity:<7} {rule.code} {rule.name}: {rule.message}"]
+    where = _where(rule)
+    if where:
+        lines.append(f"          where: {where}")
+    lines.append(f"          why:   {rule.why}")
+    lines.append(f"          fix:   {_FIXES[rule.fix]} (sss-check --explain {rule.code})")
+    return lines
+
+
+def _where(rule: RuleReport) -> str:
+    parts = []
+    if rule.bbox is not None:
+        parts.append(f"({_point(rule.bbox[0])}) to ({_point(rule.bbox[1])})")
+    if rule.vertices:
+        parts.append(_some("vertices", map(str, rule.vertices), len(rule.vertices)))
+    elif rule.edges:
+        parts.append(_some("edges", (f"{a}-{b}" for a, b in rule.edges), len(rule.edges)))
+    elif rule.faces:
+        parts.append(_some("faces", map(str, rule.faces), len(rule.faces)))
+    return "; ".join(parts)
+
+
+def _point(values: Iterable[float]) -> str:
+    return ", ".join(f"{value:.4g}" for value in values)
+
+
+def _some(noun: str, items: Iterable[str], count: int) -> str:
+    shown = " ".join(item for item, _ in zip(items, range(_SHOWN), strict=False))
+    return f"{noun} {shown}{' ...' if count > _SHOWN else ''}"
+
+
+def _not_run(report: MeshReport) -> list[str]:
+    """The rules that did not run, gathered by reason."""
+    codes: dict[str, list[str]] = {}
+    for rule in report.rules:
+        if rule.outcome == Outcome.NOT_RUN:
+            codes.setdefault(rule.reason or "no reason given", []).append(rule.code)
+    return [
+        f"  not run ({reason}): {'all' if len(found) == len(report.rules) else ' '.join(found)}"
+        for reason, found in codes.items()
+    ]

@@ -1,0 +1,107 @@
+"""What a check reports, as plain data without numpy: light to import, to send between processes, to print."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from enum import StrEnum
+from typing import Any
+
+
+class Severity(StrEnum):
+    """How bad a finding is; an error decides the exit status."""
+
+    ERROR = "error"
+    WARNING = "warning"
+    INFO = "info"
+
+
+class FixSafety(StrEnum):
+    """What a fix promises: safe keeps the shape, unsafe may invent or remove surface."""
+
+    SAFE = "safe"
+    UNSAFE = "unsafe"
+    NONE = "none"
+
+
+class Outcome(StrEnum):
+    """How a rule ended on a mesh."""
+
+    PASS = "pass"
+    FAIL = "fail"
+    WAIVED = "waived"
+    NOT_RUN = "not-run"
+
+
+RULES_VERSION = "1"
+"""Changes when a verdict may change; a record of another version is not trusted."""
+
+UNUSABLE = ("SSS602", "SSS701", "SSS702")
+"""Codes that say a file cannot be used at all: exit status 2."""
+
+
+@dataclass
+class RuleReport:
+    """How one rule ended on one mesh; the fields of the JSON object, and ``why`` and ``raised`` besides.
+
+    reason    why it did not run, or was waived
+    count     of what the rule's name names; 0 where it found nothing
+    faces, edges, vertices, face_pairs   indices in file order, at most ``run.LISTED`` of each
+    truncated whether more were found than are listed
+    raised    the rule itself failed
+    """
+
+    code: str
+    name: str
+    severity: Severity
+    outcome: Outcome
+    reason: str | None = None
+    count: int = 0
+    message: str = ""
+    faces: list[int] = field(default_factory=list)
+    edges: list[list[int]] = field(default_factory=list)
+    vertices: list[int] = field(default_factory=list)
+    face_pairs: list[list[int]] = field(default_factory=list)
+    truncated: bool = False
+    centroid: list[float] | None = None
+    bbox: list[list[float]] | None = None
+    fix: FixSafety = FixSafety.NONE
+    why: str = ""
+    raised: bool = False
+
+
+@dataclass
+class MeshReport:
+    """Everything found out about one file.
+
+    status      "ok", or "unreadable" where no mesh came out of the file
+    error       one line saying why the file cannot be used, or None
+    closedness, components  as in CONTRACTS section 1; None and [] where they could not be found out
+    warnings    what went wrong beside the check (an unwritable record), one line each
+    seconds     wall time
+    """
+
+    path: str
+    status: str = "ok"
+    error: str | None = None
+    vertices: int | None = None
+    faces: int | None = None
+    bbox: list[list[float]] | None = None
+    area: float | None = None
+    volume: float | None = None
+    closedness: dict[str, Any] | None = None
+    components: list[dict[str, Any]] = field(default_factory=list)
+    rules: list[RuleReport] = field(default_factory=list)
+    warnings: list[str] = field(default_factory=list)
+    seconds: float = 0.0
+
+    @property
+    def findings(self) -> list[RuleReport]:
+        """The rules that found something, in the order of their codes."""
+        return [rule for rule in self.rules if rule.outcome == Outcome.FAIL]
+
+    @property
+    def exit_status(self) -> int:
+        """0, 1 for a finding at error level, 2 for a file that cannot be used or a rule that raised."""
+        if any(rule.raised for rule in self.rules) or any(f.code in UNUSABLE for f in self.findings):
+            return 2
+        return int(any(finding.severity == Severity.ERROR for finding in self.findings))

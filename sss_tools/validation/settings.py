@@ -1,0 +1,36 @@
+"""What the user asked of a check, as plain data that travels to worker processes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from .outcome import Severity
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Which rules to run, how bad to take them, and what the meshes are made of.
+
+    select, ignore  codes or beginnings of codes; an empty ``select`` means all. The rules that say whether a
+                    file can be used at all (SSS602, SSS701, SSS702) always run
+    severities      code -> severity, instead of the rule's own
+    material        name of a preset, or None
+    unit            what one mesh unit is: mm, cm, m, inch; None where it was not said (presets then take mm)
+    record          whether to write MESH.sss.json beside each mesh
+    """
+
+    select: tuple[str, ...] = ()
+    ignore: tuple[str, ...] = ()
+    severities: Mapping[str, Severity] = field(default_factory=dict)
+    material: str | None = None
+    unit: str | None = None
+    record: bool = False
+
+    def wants(self, code: str) -> bool:
+        """Whether a rule is to run: selected, and not ignored by as long a prefix or a longer one."""
+        selected = max((len(prefix) for prefix in self.select if code.startswith(prefix)), default=-1)
+        ignored = max((len(prefix) for prefix in self.ignore if code.startswith(prefix)), default=-1)
+        if ignored < 0:
+            return selected >= 0 or not self.select
+        return selected > ignored

@@ -1,0 +1,298 @@
+import json
+import os
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cli.sss_check import main
+from sss_tools import shapes
+from sss_tools.mesh import Mesh
+from sss_tools.writing import write_mesh
+
+GLB_CUT = b"glTF\x02\x00\x00\x00\xff\xff\x00\x00JSON"
+
+BAD_FILES = {
+    "missing.ply": None,
+    "empty.ply": b"",
+    "empty.obj": b"",
+    "empty.stl": b"",
+    "corrupt.ply": b"ply\nformat binary_little_endian 1.0\nelement vertex 9\nproperty float x\nend_header\n\x00\x01",
+    "corrupt.obj": b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n",
+    "corrupt.stl": b"\x00" * 80 + b"\xff\xff\x00\x00" + b"\x01" * 60,
+    "corrupt.glb": GLB_CUT,
+    "text.stl": b"this is no mesh",
+    "unknown.xyz": b"0 0 0",
+    "nan.obj": b"v 0 0 nan\nv 1 0 0\nv 0 1 0\nf 1 2 3\n",
+    "points.obj": b"v 0 0 0\nv 1 0 0\n",
+}
+
+
+@pytest.fixture
+def in_folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def listing():
+    return sorted(path.name for path in Path().iterdir())
+
+
+def python(code, *arguments):
+    """Run code in a fresh interpreter that finds what this one finds."""
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(path or "." for path in sys.path)}
+    return subprocess.run(
+        [sys.executable, "-c", code, *arguments], capture_output=True, text=True, check=False, env=environment
+    )
+
+
+def write(name, mesh):
+    write_mesh(mesh, name)
+    return name
+
+
+def run_json(capsys, *arguments):
+    status = main([*arguments, "--format", "json"])
+    return status, json.loads(capsys.readouterr().out)
+
+
+def test_a_sound_mesh_is_status_zero(in_folder, capsys):
+    assert main([write("box.ply", shapes.box())]) == 0
+    captured = capsys.readouterr()
+    assert "8 vertices, 12 faces: no findings" in captured.out and captured.err == ""
+    assert listing() == ["box.ply"]
+
+
+def test_a_finding_at_error_level_is_status_one_and_exit_zero_masks_it(in_folder, capsys):
+    path = write("box.ply", shapes.inverted(shapes.box()))
+    assert main([path]) == 1
+    assert main([path, "--exit-zero"]) == 0
+    assert main([path, "--severity", "SSS204=warning"]) == 0
+    assert main([path, "--ignore", "SSS204"]) == 0
+    assert main([path, "--select", "sss1,SSS204"]) == 1
+
+
+def test_information_alone_is_status_zero(in_folder, capsys):
+    assert main([write("hollow.ply", shapes.hollow_ball()), "--format", "concise"]) == 0
+    assert "hollow.ply:SSS305 info 1 void" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("name", BAD_FILES)
+def test_a_bad_file_is_one_line_and_status_two(in_folder, capfd, name):
+    if BAD_FILES[name] is not None:
+        (in_folder / name).write_bytes(BAD_FILES[name])
+    assert main([name, "--exit-zero"]) == 2
+    captured = capfd.readouterr()
+    assert captured.err.startswith(f"sss-check: error: {name}: ")
+    assert captured.err.count("\n") == 1 and "; " in captured.err
+    assert "Traceback" not in captured.out
+    if BAD_FILES[name] is not None:
+        assert (in_folder / name).read_bytes() == BAD_FILES[name]
+
+
+def test_a_bad_file_beats_findings_and_the_others_are_still_reported(in_folder, capsys):
+    inverted = write("inverted.ply", shapes.inverted(shapes.box()))
+    status, data = run_json(capsys, "missing.ply", inverted, write("box.ply", shapes.box()))
+    assert status == 2
+    assert [mesh["status"] for mesh in data["meshes"]] == ["unreadable", "ok", "ok"]
+    failed = [[rule["code"] for rule in mesh["rules"] if rule["outcome"] == "fail"] for mesh in data["meshes"]]
+    assert failed == [["SSS702"], ["SSS204"], []]
+
+
+def test_nan_vertices_are_named_by_their_rule(in_folder, capsys):
+    vertices = shapes.box().vertices.copy()
+    vertices[2, 0] = np.nan
+    status, data = run_json(capsys, write("nan.ply", Mesh(vertices, shapes.box().faces)))
+    (rule,) = (rule for rule in data["meshes"][0]["rules"] if rule["outcome"] == "fail")
+    assert (status, rule["code"], rule["vertices"]) == (2, "SSS602", [2])
+
+
+def test_a_folder_is_searched_and_a_list_is_read_from_stdin(in_folder, capsys, monkeypatch):
+    import io
+
+    (in_folder / "sub").mkdir()
+    write("sub/a.ply", shapes.box())
+    write("b.ply", shapes.box())
+    status, data = run_json(capsys, ".")
+    assert (status, [mesh["path"] for mesh in data["meshes"]]) == (0, ["b.ply", "sub/a.ply"])
+    monkeypatch.setattr(sys, "stdin", io.StringIO("b.ply\nsub\n"))
+    _, data = run_json(capsys, "-")
+    assert [mesh["path"] for mesh in data["meshes"]] == ["b.ply", "sub/a.ply"]
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["--fix"],
+        ["--unsafe-fixes"],
+        ["--diff"],
+        ["--fix-out", "out"],
+        ["--scheduler", "tcp://here:1"],
+        ["--scene", "scene.toml"],
+        ["--format", "sarif"],
+        ["--format", "github"],
+    ],
+)
+def test_what_comes_later_is_refused_and_not_ignored(in_folder, capsys, arguments):
+    path = write("box.ply", shapes.box())
+    assert main([path, *arguments]) == 2
+    captured = capsys.readouterr()
+    assert "not available in this version" in captured.err and captured.err.count("\n") == 1
+    assert captured.out == "" and listing() == ["box.ply"]
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        [],
+        ["box.ply", "--format", "xml"],
+        ["box.ply", "--unit", "furlong"],
+        ["box.ply", "--material", "unobtainium"],
+        ["box.ply", "--select", "SSS9"],
+        ["box.ply", "--ignore", "x"],
+        ["box.ply", "--severity", "SSS101"],
+        ["box.ply", "--severity", "SSS101=fatal"],
+        ["box.ply", "--severity", "SSS999=error"],
+        ["box.ply", "--jobs", "0"],
+        ["box.ply", "--jobs", "many"],
+        ["box.ply", "--timeout", "-1"],
+        ["box.ply", "--timeout", "nan"],
+        ["box.ply", "--fix", "--unsafe-fixes"],
+        ["box.ply", "-q", "-v"],
+        ["--explain", "SSS999"],
+        ["scene.toml"],
+        ["box.ply", "-o", "no/such/folder/report.json"],
+        ["box.ply", "-o", "box.ply"],
+        ["box.ply", "-o", "./../" + "."],
+    ],
+    ids=" ".join,
+)
+def test_a_bad_option_is_one_line_and_status_two(in_folder, capsys, arguments):
+    write("box.ply", shapes.box())
+    before = (in_folder / "box.ply").read_bytes()
+    assert main(arguments) == 2
+    captured = capsys.readouterr()
+    assert captured.err.startswith("sss-check: error: ") and captured.err.count("\n") == 1
+    assert captured.out == ""
+    assert (in_folder / "box.ply").read_bytes() == before and listing() == ["box.ply"]
+
+
+def test_the_report_goes_to_the_file_named(in_folder, capsys):
+    path = write("box.ply", shapes.box())
+    (in_folder / "report.json").write_text("an older report")
+    assert main([path, "--format", "json", "-o", "report.json"]) == 0
+    assert capsys.readouterr().out == ""
+    assert json.loads((in_folder / "report.json").read_text())["schema"] == "sss-check/1"
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="the superuser may write anywhere")
+def test_an_unwritable_report_is_one_line_and_status_two(in_folder, capsys):
+    path = write("box.ply", shapes.box())
+    (in_folder / "locked").mkdir(mode=0o500)
+    assert main([path, "-o", "locked/report.json"]) == 2
+    assert "cannot be written" in capsys.readouterr().err
+
+
+def test_the_report_goes_to_stdout_by_that_name_too(in_folder, capsys):
+    path = write("box.ply", shapes.inverted(shapes.box()))
+    for name in ("-", "/dev/stdout"):
+        assert main([path, "--format", "concise", "-o", name]) == 1
+        assert "SSS204" in capsys.readouterr().out
+    assert listing() == ["box.ply"]
+
+
+def test_an_empty_list_of_meshes_is_one_line_and_status_two(in_folder, capsys, monkeypatch):
+    import io
+
+    monkeypatch.setattr(sys, "stdin", io.StringIO("\n"))
+    assert main(["-"]) == 2
+    assert "names no mesh" in capsys.readouterr().err
+
+
+def test_a_name_with_a_line_break_is_reported_on_one_line(in_folder, capsys):
+    write("two\nlines.ply", shapes.inverted(shapes.box()))
+    assert main(["two\nlines.ply", "--format", "concise"]) == 1
+    assert capsys.readouterr().out.count("\n") == 1
+
+
+def test_a_record_is_written_on_request_alone(in_folder, capsys):
+    path = write("box.ply", shapes.box())
+    assert main([path, "--no-record"]) == 0
+    assert listing() == ["box.ply"]
+    assert main([path, "--record", "--material", "marble"]) == 0
+    record = json.loads((in_folder / "box.ply.sss.json").read_text())
+    assert (record["schema"], record["material"]) == ("sss-record/1", "marble")
+
+
+def test_with_a_material_the_rules_of_scale_say_that_they_are_missing(in_folder, capsys):
+    path = write("box.ply", shapes.box())
+    _, data = run_json(capsys, path, "--material", "skin1", "--unit", "cm")
+    reasons = {rule["code"]: rule["reason"] for rule in data["meshes"][0]["rules"]}
+    assert reasons["SSS501"] == reasons["SSS502"] == "not available in this version"
+
+
+def test_explain_tells_all_about_a_rule(capsys):
+    assert main(["--explain", "sss101"]) == 0
+    text = capsys.readouterr().out
+    for part in ("SSS101 open-boundary (error)", "Finds: ", "Why:   ", "Fix:   ", "unsafe"):
+        assert part in text
+    assert main(["--explain", "open-boundary"]) == 0
+
+
+def test_statistics_follow_the_report(in_folder, capsys):
+    path = write("box.ply", shapes.inverted(shapes.box()))
+    main([path, "--format", "concise", "--statistics"])
+    assert "       1        1  SSS204 inverted-shell" in capsys.readouterr().out
+
+
+def test_the_command_is_quick_to_help_and_imports_nothing_heavy():
+    code = (
+        "import sys; from cli.sss_check import main; status = main(['--help']);"
+        "heavy = {'numpy', 'scipy', 'trimesh', 'rich', 'pymeshlab', 'pyvista', 'embreex'} & set(sys.modules);"
+        "sys.exit(f'imported {heavy}' if heavy else status)"
+    )
+    start = time.monotonic()
+    done = python(code)
+    assert done.returncode == 0, done.stderr
+    # a loose bound against a busy machine; what makes it quick is what is not imported
+    assert time.monotonic() - start < 2
+
+
+def test_checking_imports_neither_pymeshlab_nor_pyvista(in_folder):
+    path = write("box.ply", shapes.hollow_ball())
+    code = (
+        "import sys; from sss_tools.validation.run import check_file; check_file(sys.argv[1]);"
+        "sys.exit(str({'pymeshlab', 'pyvista', 'vtk', 'igl'} & set(sys.modules) or ''))"
+    )
+    done = python(code, path)
+    assert done.stderr.strip() == "", done.stderr
+
+
+def test_the_bunny_has_five_holes(shared, capsys):
+    for name in ("bunny_stanford.obj", "bunny_bun_zipper_with_holes.ply"):
+        status, data = run_json(capsys, str(shared / "meshes" / name))
+        (mesh,) = data["meshes"]
+        counts = {rule["code"]: rule["count"] for rule in mesh["rules"] if rule["severity"] == "error"}
+        assert (status, counts["SSS101"], mesh["closedness"]["hole_handling"]) == (1, 5, "cap")
+
+
+def test_spot_has_no_hole_although_its_texture_has_seams(shared, capsys):
+    status, data = run_json(capsys, str(shared / "meshes" / "spot.obj"))
+    assert status == 0 and data["meshes"][0]["vertices"] > 2930
+    assert data["meshes"][0]["closedness"]["hole_handling"] == "strict"
+
+
+def test_corrupt_real_files_are_refused(shared, capsys):
+    import csv
+
+    folder = shared / "meshes"
+    with (folder / "MANIFEST.csv").open() as file:
+        names = [row["file"] for row in csv.DictReader(file) if row["class"] == "corrupt"]
+    status, data = run_json(capsys, *(str(folder / name) for name in names))
+    assert status == 2 and len(names) > 10
+    for mesh in data["meshes"]:
+        codes = {rule["code"] for rule in mesh["rules"] if rule["outcome"] == "fail"}
+        assert codes & {"SSS602", "SSS701", "SSS702"}, mesh["path"]

@@ -1,0 +1,130 @@
+import os
+import sys
+import time
+
+import pytest
+
+from sss_tools import shapes
+from sss_tools.batch import check_files, find_meshes
+from sss_tools.errors import InputError
+from sss_tools.validation.outcome import Outcome
+from sss_tools.validation.settings import Settings
+from sss_tools.writing import write_mesh
+
+SABOTAGE = """
+import os, signal, time
+from sss_tools.validation.run import check_file
+
+def check(path, settings):
+    name = os.path.basename(path)
+    if "kill" in name:
+        os.kill(os.getpid(), signal.SIGKILL)
+    if "segfault" in name:
+        signal.signal(signal.SIGSEGV, signal.SIG_DFL)
+        os.kill(os.getpid(), signal.SIGSEGV)
+    if "hang" in name:
+        time.sleep(600)
+    if "exit" in name:
+        os._exit(7)
+    if "raise" in name:
+        raise KeyError("deep inside")
+    if "memory" in name:
+        raise MemoryError
+    if "noise" in name:
+        print("noise on stdout", flush=True)
+        os.write(1, b"native noise")
+    return check_file(path, settings)
+"""
+
+
+@pytest.fixture
+def sabotage(tmp_path, monkeypatch):
+    """A check that fails as told by the name of the mesh; workers find it on the path, as they would any module."""
+    (tmp_path / "lib").mkdir()
+    (tmp_path / "lib" / "sabotaged_check.py").write_text(SABOTAGE)
+    monkeypatch.syspath_prepend(tmp_path / "lib")
+    import sabotaged_check
+
+    yield sabotaged_check.check
+    sys.modules.pop("sabotaged_check")
+
+
+def boxes(folder, *names):
+    paths = [str(folder / f"{name}.ply") for name in names]
+    for path in paths:
+        write_mesh(shapes.box(), path)
+    return paths
+
+
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_a_worker_that_dies_makes_its_mesh_not_run_and_the_others_are_reported(tmp_path, sabotage, jobs):
+    paths = boxes(tmp_path, "a", "kill", "b", "segfault", "exit", "c")
+    reports = check_files(paths, Settings(), jobs=jobs, check=sabotage)
+    assert [report.path for report in reports] == paths
+    for report in (reports[0], reports[2], reports[5]):
+        assert report.status == "ok" and report.error is None
+    for report, reason in ((reports[1], "SIGKILL"), (reports[3], "SIGSEGV"), (reports[4], "status 7")):
+        assert {rule.outcome for rule in report.rules} == {Outcome.NOT_RUN}
+        assert reason in report.error and reason in report.rules[0].reason
+        assert report.exit_status == 0
+
+
+def test_a_check_that_hangs_is_stopped_and_the_next_mesh_is_checked(tmp_path, sabotage):
+    start = time.monotonic()
+    hung, sound = check_files(boxes(tmp_path, "hang", "b"), Settings(), jobs=1, timeout=8, check=sabotage)
+    assert "took longer than 8 s" in hung.error and hung.exit_status == 0
+    assert sound.status == "ok" and sound.rules[0].outcome == Outcome.PASS
+    assert time.monotonic() - start < 60
+
+
+def test_an_error_of_the_check_itself_is_status_two_and_running_out_of_memory_is_not(tmp_path, sabotage):
+    faulty, large = check_files(boxes(tmp_path, "raise", "memory"), Settings(), jobs=1, check=sabotage)
+    assert "KeyError" in faulty.error and faulty.exit_status == 2
+    assert "out of memory" in large.error and large.exit_status == 0
+
+
+def test_nothing_a_worker_prints_reaches_stdout(tmp_path, sabotage, capfd):
+    (report,) = check_files(boxes(tmp_path, "noise"), Settings(), check=sabotage)
+    assert report.status == "ok"
+    assert capfd.readouterr().out == ""
+
+
+def test_reports_come_in_as_they_are_done(tmp_path):
+    paths, seen = boxes(tmp_path, "a", "b", "c"), []
+    check_files(paths, Settings(), jobs=2, done=lambda report: seen.append(report.path))
+    assert sorted(seen) == paths
+
+
+def test_settings_reach_the_workers(tmp_path):
+    (report,) = check_files(boxes(tmp_path, "a"), Settings(select=("SSS2",)))
+    assert {r.code for r in report.rules if r.outcome == Outcome.PASS} == {
+        *("SSS201", "SSS202", "SSS203", "SSS204", "SSS602", "SSS701", "SSS702")
+    }
+
+
+def test_no_meshes_are_no_reports():
+    assert check_files([], Settings()) == []
+
+
+def test_folders_are_searched_recursively_for_meshes_alone(tmp_path):
+    (tmp_path / "sub" / "deep").mkdir(parents=True)
+    for name in ("b.PLY", "a.obj", "notes.txt", "scene.toml", "sub/c.stl", "sub/deep/d.glb", "a.obj.sss.json"):
+        (tmp_path / name).write_text("")
+    found = [os.path.relpath(path, tmp_path) for path in find_meshes([str(tmp_path)])]
+    assert found == ["a.obj", "b.PLY", "sub/c.stl", "sub/deep/d.glb"]
+
+
+def test_files_are_taken_as_they_are_and_each_once(tmp_path):
+    (tmp_path / "a.obj").write_text("")
+    paths = ["missing.ply", str(tmp_path / "a.obj"), "notes.txt", "missing.ply"]
+    assert find_meshes([*paths, str(tmp_path)]) == ["missing.ply", str(tmp_path / "a.obj"), "notes.txt"]
+
+
+def test_a_list_of_paths_may_name_folders_and_have_empty_lines(tmp_path):
+    (tmp_path / "a.obj").write_text("")
+    assert find_meshes(["-"], ["x.ply\n", "\n", f"{tmp_path}\n"]) == ["x.ply", str(tmp_path / "a.obj")]
+
+
+def test_a_folder_without_meshes_is_an_error(tmp_path):
+    with pytest.raises(InputError, match="no mesh in this folder"):
+        find_meshes([str(tmp_path)])

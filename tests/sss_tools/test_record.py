@@ -1,0 +1,85 @@
+import json
+import warnings
+
+import numpy as np
+import pytest
+
+from sss_tools import shapes
+from sss_tools.closedness import assess
+from sss_tools.mesh import Mesh
+from sss_tools.record import RecordWarning, geometry_hash, read_record, record_path, write_record
+from sss_tools.validation.run import check_mesh
+
+
+@pytest.fixture
+def recorded(tmp_path):
+    mesh = shapes.punctured(shapes.icosphere(), [[0, 0, 1]], 0.3)
+    path = tmp_path / "ball.ply"
+    write_record(path, mesh, check_mesh(mesh), "marble")
+    return path, mesh
+
+
+def test_a_record_lies_beside_its_mesh_and_says_what_was_found(recorded):
+    path, mesh = recorded
+    assert record_path(path).name == "ball.ply.sss.json"
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        record = read_record(path, mesh)
+    assert record.closedness == assess(mesh).closedness
+    assert record.material == "marble"
+    assert [finding["code"] for finding in record.findings] == ["SSS101"]
+    assert [part["role"] for part in record.components] == ["solid"]
+
+
+def test_no_record_is_no_warning(tmp_path):
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert read_record(tmp_path / "ball.ply", shapes.box()) is None
+
+
+def test_a_record_of_other_geometry_is_ignored_with_a_warning(recorded):
+    path, mesh = recorded
+    moved = mesh.vertices.copy()
+    moved[0, 0] = np.nextafter(moved[0, 0], 9)
+    with pytest.warns(RecordWarning, match="other geometry"):
+        assert read_record(path, Mesh(moved, mesh.faces)) is None
+    with pytest.warns(RecordWarning, match="other geometry"):
+        assert read_record(path, Mesh(mesh.vertices, mesh.faces[::-1])) is None
+
+
+@pytest.mark.parametrize(
+    ("tamper", "problem"),
+    [
+        (lambda data: {**data, "rules": "0"}, "other rules"),
+        (lambda data: {**data, "schema": "sss-record/9"}, "schema"),
+        (lambda data: {**data, "hash": None}, "other geometry"),
+        (lambda data: {**data, "closedness": {}}, "incomplete"),
+        (lambda data: {key: data[key] for key in data if key != "findings"}, "incomplete"),
+        (lambda data: [data], "schema"),
+    ],
+)
+def test_a_tampered_record_is_ignored_with_a_warning(recorded, tamper, problem):
+    path, mesh = recorded
+    sidecar = record_path(path)
+    sidecar.write_text(json.dumps(tamper(json.loads(sidecar.read_text()))))
+    with pytest.warns(RecordWarning, match=problem):
+        assert read_record(path, mesh) is None
+
+
+def test_half_a_record_is_ignored_with_a_warning(recorded):
+    path, mesh = recorded
+    sidecar = record_path(path)
+    sidecar.write_bytes(sidecar.read_bytes()[:-40])
+    with pytest.warns(RecordWarning, match="cannot be read"):
+        assert read_record(path, mesh) is None
+
+
+def test_the_hash_sees_geometry_alone():
+    box = shapes.box()
+    named = Mesh(box.vertices, box.faces, vertex_attributes={"uv": np.zeros((len(box.vertices), 2))})
+    assert geometry_hash(box) == geometry_hash(named)
+    assert geometry_hash(box) != geometry_hash(shapes.box(2.0))
+    # a vertex more or less must not be made up for by the faces' bytes
+    assert geometry_hash(Mesh(np.zeros((3, 3)), np.zeros((0, 3), int))) != geometry_hash(
+        Mesh(np.zeros((0, 3)), np.zeros((0, 3), int))
+    )
