@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from .scene.beams import beams
 from .scene.camera import CameraRays
+from .shaders.boundary import meet_boundary
 from .shaders.fast_body import FastBody
 from .shaders.opaque import meet_diffuse, meet_mirror
 from .shaders.path import ROULETTE_BELOW, PathShader
@@ -114,10 +115,10 @@ class Wavefront:
             result.radiance[:, paths.sample[escaped]] += paths.throughput[:, escaped] * background
             paths.alive[escaped] = False
         np.copyto(distance, 0, where=distance >= MISS)
+        paths.origin += paths.direction * distance
         if shader.any_medium:
             shader.weigh_flights(paths, distance, collided)
-        paths.origin += paths.direction * distance
-        if collided.any():
+            # for all paths whether they collide or not: streams must not depend on who shares the block
             shader.collide(paths, collided, result.radiance)
         index = np.flatnonzero(hit)
         if len(index):
@@ -153,7 +154,7 @@ class Wavefront:
             if not len(who):
                 continue
             if kind == "path":
-                self._path_shader.meet_boundary(paths, who, faces, result.radiance)
+                meet_boundary(scene, paths, who, faces, self._uniforms, self._tally, result.radiance)
             elif kind == "opaque":
                 meet_diffuse(scene, paths, who, faces, self._uniforms, self._tally, result.radiance)
             elif kind == "mirror":

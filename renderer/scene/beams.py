@@ -24,6 +24,8 @@ from .lights import (
 
 Float32 = NDArray[np.float32]
 
+AMBIENT_AXES = 2
+"""Axes that probe a constant environment in one pass; both directions of each are looked at."""
 IMAGE_DIRECTIONS = 8
 """Beams that stand for an environment image in one pass."""
 
@@ -39,7 +41,7 @@ class Beam:
     """Light from one place, or a constant environment (``ambient``).
 
     radiance  (3,) float32, ambient beams only
-    axes      (3, 3) float32, ambient beams only: three directions across each other, to probe with
+    axes      (3, k) float32, ambient beams only: directions across each other, to probe with
     """
 
     source: PointSource | DirectionalSource | RectanglePoint | None = None
@@ -59,19 +61,14 @@ class Beam:
 
 
 class RectanglePoint:
-    """A point of a rectangle light that sends out all of its light, with the cosine of emission."""
+    """The point of a rectangle light at the same share of its solid angle from everywhere, sending all of its light."""
 
     def __init__(self, rectangle: RectangleSource, share: NDArray[np.float64]):
-        across, upward = (2 * share - 1).astype(np.float32)
-        self._position = rectangle.center + across * rectangle.sides[0] + upward * rectangle.sides[1]
-        self._point = PointSource(self._position, rectangle.radiance * np.float32(rectangle.area))
-        self._normal = rectangle.normal
+        self._rectangle, self._share = rectangle, share
 
     def illuminate(self, position: Float32) -> Illumination:
         """What arrives at ``position`` (3, n)."""
-        light = self._point.illuminate(position)
-        emitted = np.maximum(-np.einsum("ij,ik->k", self._normal, light.direction), 0)
-        return Illumination(light.direction, light.distance, light.irradiance * emitted)
+        return self._rectangle.sample(position, *self._share)
 
 
 def beams(lights: LightSet, pass_index: int) -> list[Beam]:
@@ -85,7 +82,7 @@ def beams(lights: LightSet, pass_index: int) -> list[Beam]:
         found.append(Beam(PointSource(sphere.center, sphere.radiance * np.float32(np.pi * sphere.radius**2))))
     for environment in lights.environments:
         if environment.constant is not None:
-            found.append(Beam(radiance=environment.constant[:, 0], axes=turned))
+            found.append(Beam(radiance=environment.constant[:, 0], axes=turned[:, :AMBIENT_AXES]))
         else:
             found += _image_beams(environment, turned)
     return found

@@ -35,11 +35,13 @@ class Illumination:
     direction   (3, n) float32 unit vectors towards the light
     distance    (n,) float32 to the light, inf where it is infinitely far
     irradiance  (3, n) or (3, 1) float32 on a plane across the beam, unoccluded
+    ball        the shining ball that the light comes from, which does not shade itself
     """
 
     direction: Float32
     distance: Float32
     irradiance: Float32
+    ball: SphereSource | None = None
 
 
 class Environment:
@@ -125,22 +127,63 @@ class RectangleSource:
         upward = np.cross(normal, across)
         half = np.asarray(light.half, float) / frame.scale
         center = frame.points_in(light.center)
-        self.normal, self.center, self.radiance = _column(normal), _column(center), _column(light.radiance)
-        self.sides = _column(across * half[0]), _column(upward * half[1])
-        self.area = float(4 * half[0] * half[1])
-        corners = [
-            center + a * across * half[0] + b * upward * half[1] for a, b in ((-1, -1), (1, -1), (1, 1), (-1, 1))
-        ]
-        self.vertices, self.triangles = np.array(corners), np.array([[0, 1, 2], [0, 2, 3]])
+        self.normal, self.radiance = _column(normal), _column(light.radiance)
+        corners = [(-1, -1), (1, -1), (1, 1), (-1, 1)]
+        self.vertices = np.array([center + a * half[0] * across + b * half[1] * upward for a, b in corners])
+        self.triangles = np.array([[0, 1, 2], [0, 2, 3]])
+        self._center, self._half = center[:, None], half
+        self._axes = np.stack([across, upward, normal])
 
-    def sample(self, position: Float32, u1: Float32, u2: Float32) -> Illumination:
-        """Light from a random point of the rectangle; the mean over (u1, u2) is the whole rectangle's."""
-        chosen = self.center + (2 * u1 - 1) * self.sides[0] + (2 * u2 - 1) * self.sides[1]
-        offset = position - chosen
-        squared = np.maximum(np.einsum("ij,ij->j", offset, offset), np.float32(1e-20))
-        distance = np.sqrt(squared)
-        emitted = np.maximum(np.einsum("ij,ik->k", self.normal, offset), 0) / distance
-        return Illumination(-offset / distance, distance, self.radiance * (emitted * self.area / squared))
+    def sample(self, position: Float32, u1, u2) -> Illumination:
+        """Light from a random point of the rectangle, as if all of it came from there.
+
+        Points are uniform in the solid angle that the rectangle fills (``spherical_rectangle``), so the irradiance,
+        radiance times solid angle, has no noise. ``u1`` and ``u2`` are (n,) or numbers in [0, 1). Nothing arrives
+        behind the rectangle.
+        """
+        local = self._axes @ (position - self._center)
+        point, solid_angle = spherical_rectangle(local, self._half, u1, u2)
+        offset = point - local
+        distance = np.sqrt(np.einsum("ij,ij->j", offset, offset))
+        direction = (self._axes.T @ offset / np.maximum(distance, 1e-20)).astype(np.float32)
+        arriving = np.where(local[2] > 0, solid_angle, 0).astype(np.float32)
+        return Illumination(direction, distance.astype(np.float32), self.radiance * arriving)
+
+
+def spherical_rectangle(viewer: NDArray[np.float64], half, u1, u2) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Points of a rectangle that are uniform in solid angle, (3, n), and the solid angle it fills, (n,) steradians.
+
+    viewer  (3, n) float64 in the rectangle's frame: its middle at the origin, its sides along x and y
+    half    half its sides
+
+    Urena, Fajardo & King 2013, "An area-preserving parametrization for spherical rectangles", CGF 32(4), listing 1.
+    The solid angle is a difference of angles; where it is below 1e-6 the rectangle counts as flat and far, with points
+    uniform in area.
+    """
+    x0, x1 = -half[0] - viewer[0], half[0] - viewer[0]
+    y0, y1 = -half[1] - viewer[1], half[1] - viewer[1]
+    # the rectangle lies at negative z of the viewer, whichever side that is on
+    z0 = np.minimum(-np.abs(viewer[2]), -1e-12)
+    squared = z0 * z0
+    n0, n1 = -y0 / np.sqrt(squared + y0 * y0), x1 / np.sqrt(squared + x1 * x1)
+    n2, n3 = y1 / np.sqrt(squared + y1 * y1), -x0 / np.sqrt(squared + x0 * x0)
+    start = 2 * np.pi - np.arccos(-n2 * n3) - np.arccos(-n3 * n0)
+    solid_angle = np.arccos(-n0 * n1) + np.arccos(-n1 * n2) - start
+    turn = u1 * solid_angle + start
+    sine = np.sin(turn)
+    slope = (np.cos(turn) * n0 - n2) / np.where(sine == 0, 1e-300, sine)
+    cosine = np.clip(np.copysign(1 / np.sqrt(slope * slope + n0 * n0), slope), -1, 1)
+    x = np.clip(-cosine * z0 / np.sqrt(np.maximum(1 - cosine * cosine, 1e-12)), x0, x1)
+    reach = np.sqrt(x * x + squared)
+    h0, h1 = y0 / np.sqrt(reach * reach + y0 * y0), y1 / np.sqrt(reach * reach + y1 * y1)
+    h = h0 + u2 * (h1 - h0)
+    y = np.clip(h * reach / np.sqrt(np.maximum(1 - h * h, 1e-12)), y0, y1)
+    far = solid_angle < 1e-6
+    if far.any():
+        x, y = np.where(far, x0 + u1 * (x1 - x0), x), np.where(far, y0 + u2 * (y1 - y0), y)
+        distance2 = x * x + y * y + squared
+        solid_angle = np.where(far, 4 * half[0] * half[1] * -z0 / distance2**1.5, solid_angle)
+    return np.stack([viewer[0] + x, viewer[1] + y, np.zeros_like(x)]), solid_angle
 
 
 class SphereSource:
@@ -165,7 +208,7 @@ class SphereSource:
         return np.where((remainder > 0) & (near > 0), near, np.float32(np.inf))
 
     def sample(self, position: Float32, u1: Float32, u2: Float32) -> Illumination:
-        """Light from a random direction within the cone the ball fills, uniform in solid angle."""
+        """Light from a random direction within the cone the ball fills, uniform in solid angle; none inside it."""
         from ..optics.phase import around, spherical
 
         offset = self.center - position
@@ -176,7 +219,8 @@ class SphereSource:
         local = spherical(1 - u1 * spread, u2, np.empty_like(offset))
         direction = around(offset / np.maximum(distance, np.float32(1e-20)), local)
         reach = np.minimum(self.distance(position, direction), distance)
-        return Illumination(direction, reach, self.radiance * (np.float32(2 * np.pi) * spread))
+        solid_angle = np.where(distance > self.radius, np.float32(2 * np.pi) * spread, np.float32(0))
+        return Illumination(direction, reach, self.radiance * solid_angle, self)
 
 
 class LightSet:

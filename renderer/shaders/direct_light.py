@@ -31,15 +31,6 @@ def received(
     return light.irradiance * transmittance(scene, scene.media, origin, light, inside, owner, tally)
 
 
-def received_outside(
-    scene: TracedScene, position: Float32, normal: Float32, light: Illumination, tally: Tally
-) -> Float32:
-    """As ``received`` on sides that lie outside all objects."""
-    n = position.shape[1]
-    inside = np.zeros((max(scene.media.count, 1), n), np.int8)
-    return received(scene, position, normal, light, inside, np.full(n, -1, np.int16), tally)
-
-
 def arriving(scene: TracedScene, position: Float32, draw) -> list[Illumination]:
     """One beam from each light but environments: all of a point light, a random part of an area light.
 
@@ -54,4 +45,4 @@ def arriving(scene: TracedScene, position: Float32, draw) -> list[Illumination]:
 def pick(light: Illumination, columns: NDArray[np.intp]) -> Illumination:
     """The given columns of ``light``."""
     irradiance = light.irradiance if light.irradiance.shape[1] == 1 else light.irradiance[:, columns]
-    return Illumination(light.direction[:, columns], light.distance[columns], irradiance)
+    return Illumination(light.direction[:, columns], light.distance[columns], irradiance, light.ball)

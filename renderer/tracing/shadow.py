@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from sss_tools.rays import RAY_OFFSET
+
 from ..scene.lights import Illumination
 from .media import MediaTable
 from .tally import Tally
@@ -12,6 +14,7 @@ from .traced_scene import MISS, TracedScene, offset_from
 
 Float32 = NDArray[np.float32]
 _SHORT_OF_LIGHT = np.float32(1 - 1e-5)
+"""Shadow rays end before the light's own geometry: a relative part, and some offsets of the ray's start."""
 
 
 def transmittance(
@@ -25,20 +28,22 @@ def transmittance(
 ) -> Float32:
     """(3, n) share of the light's beam that reaches ``position`` without being bent, scattered or absorbed.
 
-    Index-matched surfaces let the beam pass, and the medium behind them attenuates it; every other surface,
-    light sources included, blocks it. ``position`` must already be offset off its surface; ``inside`` (k, n) and
-    ``owner`` (n,) say where it is (see ``Paths``).
+    Surfaces between media of one index let the beam pass, and the medium behind them attenuates it; every other
+    surface, light sources included, blocks it. ``position`` must already be offset off its surface; ``inside`` (k, n)
+    and ``owner`` (n,) say where it is (see ``Paths``).
     """
     n = position.shape[1]
     result = np.zeros((3, n), np.float32)
     active = np.arange(n)
     origin, direction = position, light.direction
-    remaining = np.where(np.isfinite(light.distance), light.distance * _SHORT_OF_LIGHT, MISS).astype(np.float32)
+    remaining = np.where(np.isfinite(light.distance), light.distance * _SHORT_OF_LIGHT - 4 * RAY_OFFSET, MISS)
+    remaining = np.maximum(remaining, 0).astype(np.float32)
     depth = np.zeros((3, n), np.float32)
     inside, owner = inside.copy(), owner.copy()
     for sphere in scene.lights.spheres:
-        visible = sphere.distance(origin, direction) >= remaining
-        active = active[visible[active]]
+        if sphere is not light.ball:
+            visible = sphere.distance(origin, direction) >= remaining
+            active = active[visible[active]]
     origin, direction, remaining = origin[:, active], direction[:, active], remaining[active]
     depth, inside, owner = depth[:, active], inside[:, active], owner[active]
     while len(active):
@@ -52,22 +57,21 @@ def transmittance(
         result[:, active[done]] = np.exp(-depth[:, done])
         if not hit.any():
             break
-        passes = hit & _lets_pass(scene, triangle)
-        keep = np.flatnonzero(passes)
-        active, triangle, distance = active[keep], triangle[keep], distance[keep]
-        direction, depth, inside, owner = direction[:, keep], depth[:, keep], inside[:, keep], owner[keep]
+        slot = np.take(scene.slot_of_triangle, triangle)
+        crossed = np.flatnonzero(hit & (slot >= 0))
+        triangle, inside = triangle[crossed], inside[:, crossed]
         normal = np.take(scene.triangle_normal, triangle, axis=1)
-        cosine = np.einsum("ij,ij->j", normal, direction)
-        landing = scene.on_plane(origin[:, keep] + distance * direction, triangle)
-        origin = offset_from(landing, normal, cosine)
-        remaining = np.maximum(np.where(remaining[keep] < MISS, remaining[keep] - distance, MISS), 0).astype(np.float32)
-        owner = cross(inside, scene.slot_of_triangle[triangle], cosine < 0)
+        cosine = np.einsum("ij,ij->j", normal, direction[:, crossed])
+        beyond = cross(inside, slot[crossed], cosine < 0)
+        # what matters is not whose surface it is but what changes there: nothing, say, where another object owns both
+        straight = media.ior[beyond] == media.ior[owner[crossed]]
+        keep = crossed[straight]
+        inside, owner = inside[:, straight], beyond[straight]
+        active, distance, direction, depth = active[keep], distance[keep], direction[:, keep], depth[:, keep]
+        landing = scene.on_plane(origin[:, keep] + distance * direction, triangle[straight])
+        origin = offset_from(landing, normal[:, straight], cosine[straight])
+        remaining = np.where(remaining[keep] < MISS, np.maximum(remaining[keep] - distance, 0), MISS)
     return result
-
-
-def _lets_pass(scene: TracedScene, triangle: NDArray[np.int32]) -> NDArray[np.bool_]:
-    slot = np.take(scene.slot_of_triangle, triangle)
-    return (slot >= 0) & np.take(scene.slot_is_matched, slot)
 
 
 def cross(inside: NDArray[np.int8], slot: NDArray[np.intp], entering: NDArray[np.bool_]) -> NDArray[np.int16]:

@@ -52,11 +52,6 @@ class TracedObject:
         """Whether light is followed through its inside."""
         return self.shader == "path"
 
-    @property
-    def is_matched(self) -> bool:
-        """Whether its boundary is invisible."""
-        return self.medium is not None and self.medium.ior == 1
-
 
 class TracedScene:
     """Geometry, lights and materials in the unit-size frame.
@@ -69,7 +64,6 @@ class TracedScene:
     translucent      the objects whose inside light is followed through; their places here are the slots
     media            their media, by slot
     slot_of_triangle (t,) slot, -1 for lights, opaque objects and those with a faster shader
-    slot_is_matched  (k + 1,) bool, whether a slot's boundary is invisible; the last, for slot -1, is False
     reflectance      (3, objects) colour of each object
     frame            between the frame and scene units
     """
@@ -115,7 +109,6 @@ class TracedScene:
         slot_of_object = np.full(len(self.objects) + 1, -1)
         slot_of_object[[thing.index for thing in self.translucent]] = np.arange(len(self.translucent))
         self.slot_of_triangle = slot_of_object[self.triangle_object]
-        self.slot_is_matched = np.array([*(thing.is_matched for thing in self.translucent), False])
 
     def _traced(self, index: int, thing: SceneObject, shader: str, handling: str) -> TracedObject:
         material = thing.material

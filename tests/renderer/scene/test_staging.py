@@ -65,7 +65,7 @@ def test_light_is_out_of_the_picture_and_shines_on_the_mesh(sides, size):
     _, triangle = RayCaster(source.vertices, source.triangles).closest(origins, directions)
     assert (triangle == -1).all()
     # and stands clear of the mesh
-    heights = (frame.points_in(scene.objects[0].mesh.vertices) - source.center[:, 0]) @ source.normal[:, 0]
+    heights = (frame.points_in(scene.objects[0].mesh.vertices) - source.vertices.mean(axis=0)) @ source.normal[:, 0]
     assert heights.min() > 0.5
 
 

@@ -1,0 +1,115 @@
+"""The dielectric boundary of translucent objects: smooth, rough, or invisible where the index does not change."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..optics.dielectric import fresnel_reflectance
+from ..optics.microfacet import sample_visible_facet, unmasked
+from ..tracing.paths import OUTSIDE, Paths
+from ..tracing.streams import Uniforms
+from ..tracing.tally import Tally
+from ..tracing.traced_scene import TracedScene, offset_from
+from .crossings import Crossings
+from .local_frame import LocalFrame
+from .lost_paths import lose
+from .point_light import light_exits, light_rough
+
+Float32 = NDArray[np.float32]
+
+
+def meet_boundary(
+    scene: TracedScene,
+    paths: Paths,
+    index: NDArray[np.intp],
+    triangle: NDArray[np.int32],
+    uniforms: Uniforms,
+    tally: Tally,
+    radiance: Float32,
+) -> None:
+    """Reflect or refract the paths ``index`` where they meet ``triangle`` (m,); their origins are the hit points.
+
+    Paths whose crossing contradicts a closed surface end.
+    """
+    at = Crossings.of(scene, paths, index, triangle)
+    lost = at.contradictory(scene)
+    if lost.any():
+        for slot in np.unique(at.slot[lost]):
+            lose(scene, paths, index[lost & (at.slot == slot)], int(slot), uniforms, tally, radiance)
+        at = at.take(np.flatnonzero(~lost))
+    if not len(at.index):
+        return
+    choice, u1 = uniforms.draw_at(paths.stream, at.index)
+    straight = at.eta == 1
+    roughness = np.array([thing.roughness for thing in scene.translucent], np.float32)[at.slot]
+    rough = ~straight & (roughness > 0)
+    turned, reflected = at.direction.copy(), np.zeros(len(at.index), bool)
+    smooth = np.flatnonzero(~straight & ~rough)
+    if len(smooth):
+        turned[:, smooth], reflected[smooth] = _turn(
+            at.direction[:, smooth], at.facing[:, smooth], at.eta[smooth], choice[smooth]
+        )
+        if scene.lights.points:
+            light_exits(scene, paths, at.take(smooth[~reflected[smooth]]), tally, radiance)
+    for slot, thing in enumerate(scene.translucent) if rough.any() else ():
+        mine = np.flatnonzero(rough & (at.slot == slot))
+        if len(mine):
+            u2, _ = uniforms.draw_at(paths.stream, at.index[mine])
+            turned[:, mine], reflected[mine] = _scatter_rough(
+                scene, paths, at.take(mine), thing.roughness, choice[mine], u1[mine], u2, tally, radiance
+            )
+    _keep_side(turned, at.near_normal, reflected)
+    crossed = at.index[~reflected]
+    paths.inside[:, crossed] = at.inside_beyond[:, ~reflected]
+    paths.owner[crossed] = at.beyond[~reflected]
+    paths.scattered[at.index] &= paths.owner[at.index] != OUTSIDE
+    paths.lit[at.index] &= straight
+    paths.direction[:, at.index] = turned
+    side = np.where(reflected, np.float32(1), np.float32(-1))
+    paths.origin[:, at.index] = offset_from(at.position, at.near_normal, side)
+
+
+def _turn(direction: Float32, normal: Float32, eta: Float32, u: Float32) -> tuple[Float32, NDArray[np.bool_]]:
+    """Snell's law and Fresnel's choice: new directions (3, n), and whether they are reflected.
+
+    direction  (3, n) unit, of travel; normal (3, n) unit, against it
+    eta        (n,) index beyond over before
+    u          (n,) uniforms: reflected where they are below the reflectance
+    """
+    cos_in = np.clip(-np.einsum("ij,ij->j", direction, normal), 0, 1)
+    reflectance, cos_out = fresnel_reflectance(cos_in, eta)
+    reflected = u < reflectance
+    inverse = 1 / eta
+    along = np.where(reflected, 2 * cos_in, cos_in * inverse - cos_out)
+    turned = np.where(reflected, 1, inverse) * direction + along * normal
+    turned /= np.sqrt(np.einsum("ij,ij->j", turned, turned))
+    return turned, reflected
+
+
+def _scatter_rough(
+    scene, paths: Paths, at: Crossings, alpha: float, choice, u1, u2, tally: Tally, radiance: Float32
+) -> tuple[Float32, NDArray[np.bool_]]:
+    """GGX reflection or refraction, after light without extent was connected; weighs the throughputs.
+
+    With visible facets drawn, the weight of the scattered direction is its own masking G1 (Heitz 2018, eq. 19).
+    """
+    frame = LocalFrame(at.facing)
+    view = frame.to_local(-at.direction)
+    if scene.lights.points:
+        light_rough(scene, paths, at, frame, view, tally, radiance)
+    facet = sample_visible_facet(view, alpha, u1, u2)
+    turned, reflected = _turn(-view, facet, at.eta, choice)
+    # single scattering: what ends on the wrong side would meet a second facet, and is lost
+    valid = np.where(reflected, turned[2] > 0, turned[2] < 0)
+    paths.throughput[:, at.index] *= np.where(valid, unmasked(turned[2], alpha), 0)
+    paths.alive[at.index] &= valid
+    return frame.to_world(turned), reflected
+
+
+def _keep_side(turned: Float32, near_normal: Float32, reflected: NDArray[np.bool_]) -> None:
+    """Mirror directions, in place, that a shading normal sent to the wrong side of the true surface."""
+    height = np.einsum("ij,ij->j", turned, near_normal)
+    wrong = np.flatnonzero(np.where(reflected, height <= 0, height >= 0))
+    if len(wrong):
+        turned[:, wrong] -= 2 * height[wrong] * near_normal[:, wrong]

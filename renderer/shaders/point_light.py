@@ -1,0 +1,106 @@
+"""Light without extent, which no path can meet by chance: points and parallel beams.
+
+Where the boundary is invisible it is connected to collisions, at rough boundaries to the boundary, both without
+bias. Behind smooth boundaries it is approximated where paths leave.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..optics.dielectric import diffuse_external_reflectance, transmittance
+from ..optics.microfacet import scatter
+from ..optics.phase import henyey_greenstein
+from ..tracing.paths import Paths
+from ..tracing.shadow import transmittance as shadow_transmittance
+from ..tracing.tally import Tally
+from ..tracing.traced_scene import TracedScene
+from .crossings import Crossings
+from .direct_light import pick, received
+from .local_frame import LocalFrame
+
+Float32 = NDArray[np.float32]
+
+
+def light_collisions(
+    scene: TracedScene, paths: Paths, index: NDArray[np.intp], tally: Tally, radiance: Float32
+) -> None:
+    """Light the collisions of the paths ``index`` that lie behind invisible boundaries.
+
+        w p(mu) E0 exp(-optical depth), w with this collision's albedo
+
+    ``paths.direction`` must still be the one before the collision.
+    """
+    media = scene.media
+    index = index[media.ior[paths.owner[index]] == 1]
+    if not len(index):
+        return
+    position, direction = paths.origin[:, index], paths.direction[:, index]
+    owner, sample = paths.owner[index], paths.sample[index]
+    for source in scene.lights.points:
+        light = source.illuminate(position)
+        mu = np.einsum("ij,ij->j", direction, light.direction)
+        phase = np.empty_like(mu)
+        for slot, g in enumerate(media.g):
+            np.copyto(phase, henyey_greenstein(mu, g), where=owner == slot)
+        visible = shadow_transmittance(scene, media, position, light, paths.inside[:, index], owner, tally)
+        radiance[:, sample] += paths.throughput[:, index] * light.irradiance * (phase * visible)
+
+
+def light_rough(
+    scene: TracedScene, paths: Paths, at: Crossings, frame: LocalFrame, view: Float32, tally: Tally, radiance: Float32
+) -> None:
+    """Light rough boundary points by reflection or transmission, whichever side the light is on.
+
+    frame, view  axes around the shading normal on the viewer's side, and the direction back along the path in them
+    """
+    alpha = scene.translucent[int(at.slot[0])].roughness
+    for source in scene.lights.points:
+        light = source.illuminate(at.position)
+        to_light = frame.to_local(light.direction)
+        value = scatter(view, to_light, at.eta, alpha)
+        height = np.einsum("ij,ij->j", at.near_normal, light.direction)
+        same_side = height > 0
+        owner = np.where(same_side, at.before, at.beyond)
+        # straight rays lead to the light from where the index is 1; shading and true normal must agree on the side
+        useful = np.flatnonzero((value > 0) & (scene.media.ior[owner] == 1) & (height * to_light[2] > 0))
+        if len(useful):
+            some = at.take(useful)
+            side = np.where(same_side[useful], np.float32(1), np.float32(-1))
+            inside = np.where(same_side[useful], some.inside_before, some.inside_beyond)
+            arrived = received(
+                scene, some.position, some.near_normal * side, pick(light, useful), inside, owner[useful], tally
+            )
+            radiance[:, paths.sample[some.index]] += paths.throughput[:, some.index] * arrived * value[useful]
+
+
+def light_exits(scene: TracedScene, paths: Paths, at: Crossings, tally: Tally, radiance: Float32) -> None:
+    """Light the points where scattered paths leave a smooth boundary from inside.
+
+    Such light cannot be connected straight on. The exit is taken for diffuse: by reciprocity the light enters here
+    with T(x), x = N.L, and spreads like diffuse light,
+
+        w E0 max(x, 0) T(x) / (pi (1 - Fe))
+
+    the separable form of the BSSRDF (Jensen et al. 2001, eq. 5). Energy is exact in a furnace; the sideways shift of
+    the refracted beam is lost: 2-3 % on bodies of 20 transport mean free paths radius, 11-16 % at 2.
+    """
+    ior = scene.media.ior
+    leaves = (ior[at.beyond] == 1) & (ior[at.before] != 1) & paths.scattered[at.index]
+    at = at.take(np.flatnonzero(leaves))
+    if not len(at.index):
+        return
+    normal, inner = -at.near_normal, ior[at.before]
+    share = np.array([1 - diffuse_external_reflectance(float(index)) for index in ior], np.float32)[at.before]
+    for source in scene.lights.points:
+        light = source.illuminate(at.position)
+        x = np.einsum("ij,ij->j", normal, light.direction)
+        lit = np.flatnonzero(x > 0)
+        if len(lit):
+            some = at.take(lit)
+            arrived = received(
+                scene, some.position, normal[:, lit], pick(light, lit), some.inside_beyond, some.beyond, tally
+            )
+            spread = x[lit] * transmittance(x[lit], inner[lit]) / (np.float32(np.pi) * share[lit])
+            radiance[:, paths.sample[some.index]] += paths.throughput[:, some.index] * arrived * spread
