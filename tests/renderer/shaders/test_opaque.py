@@ -69,6 +69,20 @@ def test_matched_slab_dims_the_sun_on_the_floor_by_its_optical_depth():
         assert_mean(1.03 * shown.channel(), expected, false_alarm=1e-4, detects=0.03 * expected)
 
 
+def test_lamp_behind_glass_lights_the_floor_like_the_sky_there():
+    """No straight line leads through glass: what a path meets beyond it counts, sampled though the lamp was.
+
+    The lamp fills 99.9 % of what the floor's cosine weighs; 3 % is seen.
+    """
+    floor = placed(FLOOR, diffuse(0.5))
+    glass = placed(moved(box((40, 0.2, 40)), (0, 1, 0)), translucent(1.0, 1e-3, ior=1.5))
+    lamp = RectangleLight(vector(0, 2, 0), vector(0, 0, 0), vector(0, 0, 1), (60, 60), vector(1, 1, 1))
+    view = camera((0.3, 0.4, 0.1), (0, 0.01, 0), fov=0.01, resolution=(64, 64))
+    lit, open_sky = (picture(scene([floor, glass], [light], view), 8, seed=seed(5)).channel()
+                     for light in (lamp, WHITE_SKY))  # fmt: skip
+    assert_mean(lit - open_sky, 0, false_alarm=1e-4, detects=0.03 * open_sky.mean())
+
+
 def test_rectangle_in_view_shows_its_radiance_in_front_and_black_behind():
     light = RectangleLight(vector(0, 1, 0), vector(0, 0, 0), vector(0, 0, 1), (0.5, 0.5), vector(1, 2, 3))
     floor = placed(FLOOR, diffuse(0.0))
