@@ -17,7 +17,7 @@ from sss_tools.shapes import box, moved, punctured, with_internal
 from sss_tools.writing import write_mesh
 
 HOLES = [[0.239, 0.847, 0.427], [-0.087, 0.421, 0.267], [-0.116, 0.785, 0.350]]
-"""Centres on the elephant where the camera sees them: forehead, shoulder, and the thin ear, through both its sides."""
+"""Centres on the elephant where the camera sees them: forehead, shoulder and ear."""
 HOLE_RADIUS = 0.035
 SHELL = ([0.19, 0.80, 0.24], 0.12)
 """Centre and radius of a ball in the head, well inside."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 import time
 from collections.abc import Callable
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -230,4 +230,7 @@ def guide_arrays(renderer: Renderer, names: list[str]) -> dict[str, NDArray]:
 
 def merged(parts: list[Path]) -> Picture:
     """The picture of all parts of one render. Raises InputError for parts that do not belong together."""
-    return image.merge({path: replace(image.read(path)) for path in parts})
+    for path in parts:
+        if parts.count(path) > 1:
+            raise InputError(path, "is named twice", "name each part once")
+    return image.merge({path: image.read(path) for path in parts})

@@ -88,9 +88,8 @@ class Wavefront:
             living = np.count_nonzero(paths.alive)
             if living <= paths.count * _COMPACT_AT:
                 paths.compact()
-        tally, self._tally.__dict__ = Tally(**vars(self._tally)), vars(Tally())
-        tally.samples = count
-        result.tally = tally
+        result.tally = self._tally.take()
+        result.tally.samples = count
         return result
 
     def _emit(self, pass_index: int, first_pixel: int, first_sample: int, count: int) -> None:
@@ -129,7 +128,7 @@ class Wavefront:
         """Distance and triangle of what each path meets; triangle -1 for nothing, -2 - k for the k-th sphere light."""
         paths = self._paths
         distance, triangle = self.scene.closest(paths.origin, paths.direction, limit)
-        self._tally.rays += paths.count
+        self._tally.rays += int(np.count_nonzero(paths.alive))
         for k, sphere in enumerate(self.scene.lights.spheres):
             reach = sphere.distance(paths.origin, paths.direction)
             nearer = reach < distance

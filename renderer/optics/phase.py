@@ -30,12 +30,15 @@ def sample_henyey_greenstein(g: float, u: Float32) -> Float32:
 
         mu = [1 + g^2 - ((1 - g^2) / (1 - g + 2 g u))^2] / (2 g),   2 u - 1 for g = 0
 
-    Witt 1977, ApJS 35:1, eq. 19. Below |g| = 1e-3 the quotient cancels in single precision; the first order,
-    mu = s + g (1 - s^2) 3/2 with s = 2 u - 1, is then off by less than g^2.
+    Witt 1977, ApJS 35:1, eq. 19. For small g the difference cancels in single precision; there it is multiplied out,
+
+        mu = [s (1 + g^2) + g (3 + s^2 + g^2 (s^2 - 1)) / 2] / (1 + g s)^2,   s = 2 u - 1.
     """
     s = 2 * u - 1
-    if abs(g) < 1e-3:
-        return np.clip(s + 1.5 * g * (1 - s * s), -1, 1)
+    if abs(g) < 0.5:
+        across = s * s
+        mu = (s * (1 + g * g) + g * (3 + across + g * g * (across - 1)) / 2) / (1 + g * s) ** 2
+        return np.clip(mu, -1, 1)
     ratio = (1 - g * g) / (1 + g * s)
     return np.clip((1 + g * g - ratio * ratio) / (2 * g), -1, 1)
 

@@ -24,7 +24,8 @@ def _unit(vector) -> NDArray[np.float64]:
     return vector / np.linalg.norm(vector)
 
 
-def _column(vector) -> Float32:
+def column(vector) -> Float32:
+    """Three numbers as (3, 1) float32, to stand for all points."""
     return np.asarray(vector, np.float32).reshape(3, 1)
 
 
@@ -48,7 +49,7 @@ class Environment:
     """Radiance from infinitely far away."""
 
     def __init__(self, light: EnvironmentLight):
-        self.constant = None if light.radiance is None else _column(light.radiance)
+        self.constant = None if light.radiance is None else column(light.radiance)
         if light.image is not None:
             self._image = np.ascontiguousarray(np.moveaxis(light.image, -1, 0), np.float32)
             self._turn = np.float32(light.rotation / 360)
@@ -85,8 +86,8 @@ class PointSource:
     @classmethod
     def of(cls, light: PointLight, frame: UnitFrame) -> PointSource:
         """The light in the frame."""
-        return cls(_column(frame.points_in(light.position)),
-                   _column(np.asarray(light.intensity, float) / frame.scale**2))  # fmt: skip
+        return cls(column(frame.points_in(light.position)),
+                   column(np.asarray(light.intensity, float) / frame.scale**2))  # fmt: skip
 
     def illuminate(self, position: Float32) -> Illumination:
         """What arrives at ``position`` (3, n)."""
@@ -102,7 +103,7 @@ class DirectionalSource:
     @classmethod
     def of(cls, light: DirectionalLight) -> DirectionalSource:
         """The light, which is the same in every frame."""
-        return cls(_column(-_unit(light.direction)), _column(light.irradiance))
+        return cls(column(-_unit(light.direction)), column(light.irradiance))
 
     def illuminate(self, position: Float32) -> Illumination:
         """What arrives at ``position`` (3, n)."""
@@ -127,7 +128,7 @@ class RectangleSource:
         upward = np.cross(normal, across)
         half = np.asarray(light.half, float) / frame.scale
         center = frame.points_in(light.center)
-        self.normal, self.radiance = _column(normal), _column(light.radiance)
+        self.normal, self.radiance = column(normal), column(light.radiance)
         corners = [(-1, -1), (1, -1), (1, 1), (-1, 1)]
         self.vertices = np.array([center + a * half[0] * across + b * half[1] * upward for a, b in corners])
         self.triangles = np.array([[0, 1, 2], [0, 2, 3]])
@@ -190,9 +191,9 @@ class SphereSource:
     """A shining ball, met by rays in closed form (no tessellation, no bias)."""
 
     def __init__(self, light: SphereLight, frame: UnitFrame):
-        self.center = _column(frame.points_in(light.center))
+        self.center = column(frame.points_in(light.center))
         self.radius = np.float32(light.radius / frame.scale)
-        self.radiance = _column(light.radiance)
+        self.radiance = column(light.radiance)
 
     def distance(self, origin: Float32, direction: Float32) -> Float32:
         """(n,) distance at which rays from outside meet the ball, inf where they do not.

@@ -246,4 +246,6 @@ def _usable(mesh: Mesh, path: Path, place: Place) -> Mesh:
         raise InputError(path, f"the mesh of {place.name} has no faces", "give a mesh with triangles")
     if not np.isfinite(mesh.vertices).all():
         raise InputError(path, f"the mesh of {place.name} has vertices that are not finite", "repair it")
+    if not 0 < mesh.longest_side < float("inf"):
+        raise InputError(path, f"the mesh of {place.name} has no extent", "check its vertices and the transform")
     return mesh

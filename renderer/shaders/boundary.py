@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from ..optics.dielectric import fresnel_reflectance
 from ..optics.microfacet import sample_visible_facet, unmasked
-from ..tracing.paths import OUTSIDE, Paths
+from ..tracing.paths import Paths
 from ..tracing.streams import Uniforms
 from ..tracing.tally import Tally
 from ..tracing.traced_scene import TracedScene, offset_from
@@ -63,7 +63,9 @@ def meet_boundary(
     crossed = at.index[~reflected]
     paths.inside[:, crossed] = at.inside_beyond[:, ~reflected]
     paths.owner[crossed] = at.beyond[~reflected]
-    paths.scattered[at.index] &= paths.owner[at.index] != OUTSIDE
+    # what happened in clear or index-matched surroundings does not make a path one that comes from a body's inside
+    entered = ~reflected & (scene.media.ior[at.before] == 1) & ~straight
+    paths.scattered[at.index] &= ~entered
     paths.lit[at.index] &= straight
     paths.direction[:, at.index] = turned
     side = np.where(reflected, np.float32(1), np.float32(-1))

@@ -12,6 +12,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from sss_tools.rays import RAY_OFFSET
+
 from ..optics.free_flight import (
     channel_probabilities,
     choose_channel,
@@ -108,7 +110,8 @@ class PathShader:
     def _lose_leaked(self, paths: Paths, collided: NDArray[np.bool_], radiance: Float32) -> None:
         """End paths that collide outside their object's bounding box: they have slipped through its surface."""
         for slot, thing in enumerate(self.scene.translucent):
-            beyond = (paths.origin < thing.lower) | (paths.origin > thing.upper)
+            # rounded positions on a flat side of the box are not outside
+            beyond = (paths.origin < thing.lower - RAY_OFFSET) | (paths.origin > thing.upper + RAY_OFFSET)
             lost = beyond.any(axis=0) & collided & (paths.owner == slot)
             if lost.any():
                 lose(self.scene, paths, np.flatnonzero(lost), slot, self._uniforms, self.tally, radiance)

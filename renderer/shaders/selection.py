@@ -92,7 +92,7 @@ def predicted_errors(look: Appearance) -> dict[str, float]:
     plumb = float(np.hypot(ball, shape))
     blur = min(1.0, 2 * look.diffusion / look.footprint)
     return {
-        "diffuse": min(0.6, 1.6 * tau**-1.35) * blur + 0.01,
+        "diffuse": float(np.hypot(min(0.6, 1.6 * tau**-1.35) * blur, shape)) + 0.01,
         "scalar": float(np.hypot(plumb, 0.3 * look.unlit)),
         "plumb": plumb,
     }

@@ -20,7 +20,7 @@ class Paths:
     sample      (n,) int32 camera sample to which radiance is added
     inside      (k, n) int8 how many times inside each of the k translucent objects: entered minus left
     owner       (n,) int16 which of the k owns the medium here (the first that the path is inside of), -1 outside
-    scattered   (n,) bool, whether the path has collided since it was last outside
+    scattered   (n,) bool, whether the path has collided since a boundary last bent it inwards
     lit         (n,) bool, whether area lights were already sampled from the last vertex, so that meeting one
                 now must not count again
     surfaces    (n,) int16 surfaces met since the last collision

@@ -50,7 +50,7 @@ class Uniforms:
     """Draws from up to ``capacity`` streams at once, into buffers of its own.
 
     Call ``draw(state)``: it advances the (n,) uint64 states in place and returns two (n,) float32 views with
-    values in [0, 1), valid until the call after next (two sets of buffers take turns).
+    values in [0, 1), valid until the fourth call after (four sets of buffers take turns).
     """
 
     def __init__(self, capacity: int):

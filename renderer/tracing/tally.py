@@ -24,6 +24,13 @@ class Tally:
     terminated: int = 0
     non_finite: int = 0
 
+    def take(self) -> Tally:
+        """The counts so far, from where counting starts anew."""
+        counted = Tally(**vars(self))
+        for entry in fields(self):
+            setattr(self, entry.name, 0)
+        return counted
+
     def add(self, other: Tally) -> None:
         """Count ``other`` in."""
         for entry in fields(self):

@@ -130,6 +130,7 @@ def test_ranges_of_passes_merge_into_the_whole(workplace):
         assert merged["passes"] == 6
         np.testing.assert_allclose(merged["film_sum"], whole["film_sum"], rtol=1e-12, atol=0)
         np.testing.assert_allclose(merged["film_sum_of_squares"], whole["film_sum_of_squares"], rtol=1e-12, atol=0)
+    assert main(["merge", "a.npz", "a.npz", "-o", "twice.npz"]) == 2 and not Path("twice.npz").exists()
     assert main(["merge", "a.npz", "b.npz", "-o", "merged.png"]) == 0
     assert Path("merged.png").read_bytes().startswith(PNG_MAGIC)
 

@@ -1,5 +1,7 @@
 """Scenes from TOML: what is read, and the one line for what cannot be."""
 
+import re
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
@@ -338,6 +340,12 @@ def test_mesh_without_faces_is_refused(folder):
     header += "element face 0\nproperty list uchar int vertex_indices\nend_header\n"
     (folder.path / "tetrahedron.ply").write_text(header)
     assert "tetrahedron.ply" in refusal(folder.write())
+
+
+def test_mesh_shrunk_to_a_point_is_refused(folder):
+    file = folder.path / "tetrahedron.ply"
+    file.write_text(re.sub(r"(?m)^[01] [01] [01]$", "1 1 1", file.read_text()))
+    assert "no extent" in refusal(folder.write())
 
 
 def test_mesh_with_nan_is_refused(folder):

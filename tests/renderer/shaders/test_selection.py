@@ -89,9 +89,11 @@ def test_predicted_errors_of_a_ball_are_the_measured_ones():
     errors = predicted_errors(look)
     assert errors["plumb"] == pytest.approx(np.hypot(0.03, 0.03))
     assert errors["scalar"] == pytest.approx(np.hypot(errors["plumb"], 0.15))
-    assert errors["diffuse"] == pytest.approx(0.6 + 0.01)
+    assert errors["diffuse"] == pytest.approx(np.hypot(0.6, 0.03) + 0.01)
     # what is blurred within a pixel does not show
-    assert predicted_errors(replace(look, footprint=100.0))["diffuse"] == pytest.approx(0.6 * 0.02 + 0.01)
+    assert predicted_errors(replace(look, footprint=100.0))["diffuse"] == pytest.approx(
+        np.hypot(0.6 * 0.02, 0.03) + 0.01
+    )
     # long and flat bodies are worse, and what is lit from the camera hides the scalar's weakness
     assert predicted_errors(replace(look, aspect=3.0))["plumb"] > 0.2
     assert predicted_errors(replace(look, unlit=0.0))["scalar"] == errors["plumb"]
