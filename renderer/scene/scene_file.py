@@ -9,6 +9,20 @@ from typing import Any
 import numpy as np
 
 from sss_tools.errors import InputError
+from sss_tools.keys import (
+    Key,
+    Kind,
+    Place,
+    did_you_mean,
+    one_of,
+    read_keys,
+    read_variant,
+    to_colour,
+    to_number,
+    to_text,
+    to_vector,
+    to_whole_numbers,
+)
 from sss_tools.loading import load_mesh
 from sss_tools.medium import UNITS
 from sss_tools.mesh import Mesh
@@ -27,20 +41,6 @@ from .description import (
 )
 from .environment_image import is_file, read_environment_image
 from .fingerprint import with_hash
-from .keys import (
-    Key,
-    Kind,
-    Place,
-    did_you_mean,
-    one_of,
-    read_keys,
-    read_variant,
-    to_colour,
-    to_number,
-    to_text,
-    to_vector,
-    to_whole_numbers,
-)
 from .materials import read_material
 from .transform import read_transform, transformed
 
