@@ -56,6 +56,8 @@ def load_mesh(path: str | Path) -> Mesh:
         if promised is not None and len(mesh.faces) != promised:
             raise ValueError(f"corrupt: it has {promised} triangles, of which {len(mesh.faces)} make sense")
         return mesh
+    except MemoryError:
+        raise  # says nothing about the file
     # The parsers are not written against hostile files: a stray byte surfaces as any exception of numpy,
     # zipfile, json, lxml or collada, and each of them means the same to the user.
     except Exception as error:

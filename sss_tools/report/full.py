@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 
 from ..validation.outcome import FixSafety, MeshReport, Outcome, RuleReport, Severity
 
@@ -25,20 +25,29 @@ _FIXES = {
 _SHOWN = 6
 
 
-def render(reports: Sequence[MeshReport], verbose: bool = False) -> str:
+def chunks(reports: Sequence[MeshReport], verbose: bool = False) -> Iterator[str]:
     """All meshes one after the other; ``verbose`` lists the rules that passed, too."""
-    return "\n".join(section(report, verbose) for report in reports)
+    for number, report in enumerate(reports):
+        yield "\n" * (number > 0) + section(report, verbose)
+
+
+def render(reports: Sequence[MeshReport], verbose: bool = False) -> str:
+    """The whole report."""
+    return "".join(chunks(reports, verbose))
 
 
 def section(report: MeshReport, verbose: bool = False) -> str:
     """One mesh."""
-    lines = [f"{report.path}: {_headline(report)}"]
+    name = report.path if report.object is None else f"{report.path} ({report.object})"
+    lines = [f"{name}: {_headline(report)}"]
     if report.closedness is not None:
         lines += _verdict(report)
     elif report.error is not None:
         lines.append(f"  {report.error.removeprefix(f'{report.path}: ')}")
     for rule in report.findings:
         lines += _finding(rule)
+    for rule in report.waived:
+        lines += _waived(rule)
     lines += _not_run(report)
     if verbose:
         passed = [f"{rule.code} {rule.name}" for rule in report.rules if rule.outcome == Outcome.PASS]
@@ -54,6 +63,8 @@ def _headline(report: MeshReport) -> str:
         return "unreadable"
     counts = [(sum(rule.severity == severity for rule in report.findings), severity) for severity in Severity]
     tally = ", ".join(f"{count} {severity}{'s' * (count > 1)}" for count, severity in counts if count)
+    if report.waived:
+        tally = f"{tally or 'no findings'}, {len(report.waived)} waived"
     return f"{report.vertices} vertices, {report.faces} faces: {tally or 'no findings'}"
 
 
@@ -77,6 +88,14 @@ def _finding(rule: RuleReport) -> list[str]:
     lines.append(f"          why:   {rule.why}")
     lines.append(f"          fix:   {_FIXES[rule.fix]} (sss-check --explain {rule.code})")
     return lines
+
+
+def _waived(rule: RuleReport) -> list[str]:
+    lines = [f"  {Outcome.WAIVED:<7} {rule.code} {rule.name}: {rule.message}"]
+    where = _where(rule)
+    if where:
+        lines.append(f"          where: {where}")
+    return [*lines, f"          waived: {rule.reason}"]
 
 
 def _where(rule: RuleReport) -> str:
@@ -103,11 +122,7 @@ def _some(noun: str, items: Iterable[str], count: int) -> str:
 
 def _not_run(report: MeshReport) -> list[str]:
     """The rules that did not run, gathered by reason."""
-    codes: dict[str, list[str]] = {}
-    for rule in report.rules:
-        if rule.outcome == Outcome.NOT_RUN:
-            codes.setdefault(rule.reason or "no reason given", []).append(rule.code)
     return [
-        f"  not run ({reason}): {'all' if len(found) == len(report.rules) else ' '.join(found)}"
-        for reason, found in codes.items()
+        f"  not run ({reason}): {'all' if len(rules) == len(report.rules) else ' '.join(rule.code for rule in rules)}"
+        for reason, rules in report.not_run.items()
     ]

@@ -41,7 +41,9 @@ def check_file(path: str | Path, settings: Settings | None = None) -> MeshReport
         report = _report_unreadable(path, error, settings)
         report.seconds = time.perf_counter() - start
         return report
-    medium = Medium.preset(settings.material, settings.unit or "mm") if settings.material else None
+    medium = settings.medium
+    if medium is None and settings.material is not None:
+        medium = Medium.preset(settings.material, settings.unit or "mm")
     report = check_mesh(mesh, Context(medium, settings.unit), settings, path)
     if settings.record and report.closedness is not None:
         try:

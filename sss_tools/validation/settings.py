@@ -4,8 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 from .outcome import Severity
+
+if TYPE_CHECKING:
+    from ..medium import Medium
 
 
 @dataclass(frozen=True)
@@ -15,7 +19,8 @@ class Settings:
     select, ignore  codes or beginnings of codes; an empty ``select`` means all. The rules that say whether a
                     file can be used at all (SSS602, SSS701, SSS702) always run
     severities      code -> severity, instead of the rule's own
-    material        name of a preset, or None
+    material        name of a preset, or what reports and records call ``medium``; None where nothing was said
+    medium          coefficients per mesh unit, of a material that is no preset
     unit            what one mesh unit is: mm, cm, m, inch; None where it was not said (presets then take mm)
     record          whether to write MESH.sss.json beside each mesh
     """
@@ -24,6 +29,7 @@ class Settings:
     ignore: tuple[str, ...] = ()
     severities: Mapping[str, Severity] = field(default_factory=dict)
     material: str | None = None
+    medium: Medium | None = None
     unit: str | None = None
     record: bool = False
 

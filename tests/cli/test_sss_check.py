@@ -130,10 +130,7 @@ def test_a_folder_is_searched_and_a_list_is_read_from_stdin(in_folder, capsys, m
         ["--unsafe-fixes"],
         ["--diff"],
         ["--fix-out", "out"],
-        ["--scheduler", "tcp://here:1"],
         ["--scene", "scene.toml"],
-        ["--format", "sarif"],
-        ["--format", "github"],
     ],
 )
 def test_what_comes_later_is_refused_and_not_ignored(in_folder, capsys, arguments):
@@ -160,6 +157,9 @@ def test_what_comes_later_is_refused_and_not_ignored(in_folder, capsys, argument
         ["box.ply", "--jobs", "many"],
         ["box.ply", "--timeout", "-1"],
         ["box.ply", "--timeout", "nan"],
+        ["box.ply", "--max-memory", "much"],
+        ["box.ply", "--max-memory", "0G"],
+        ["box.ply", "--material", "missing.toml"],
         ["box.ply", "--fix", "--unsafe-fixes"],
         ["box.ply", "-q", "-v"],
         ["--explain", "SSS999"],
@@ -296,3 +296,78 @@ def test_corrupt_real_files_are_refused(shared, capsys):
     for mesh in data["meshes"]:
         codes = {rule["code"] for rule in mesh["rules"] if rule["outcome"] == "fail"}
         assert codes & {"SSS602", "SSS701", "SSS702"}, mesh["path"]
+
+
+def test_sarif_and_github_reports_are_written(in_folder, capsys):
+    path = write("box.ply", shapes.inverted(shapes.box()))
+    assert main([path, "--format", "sarif"]) == 1
+    (run,) = json.loads(capsys.readouterr().out)["runs"]
+    assert [result["ruleId"] for result in run["results"]] == ["SSS204"]
+    assert main([path, "--format", "github", "--statistics"]) == 1
+    text = capsys.readouterr().out
+    assert text.startswith("::error file=box.ply,title=SSS204 inverted-shell::") and "       1        1" in text
+
+
+def test_statistics_are_part_of_a_report_for_programs(in_folder, capsys):
+    path = write("box.ply", shapes.inverted(shapes.box()))
+    _, data = run_json(capsys, path, "--statistics")
+    assert [row["code"] for row in data["statistics"]] == ["SSS204"]
+    main([path, "--statistics", "--format", "sarif"])
+    (run,) = json.loads(capsys.readouterr().out)["runs"]
+    assert [row["code"] for row in run["properties"]["statistics"]] == ["SSS204"]
+
+
+def test_a_configuration_file_counts_and_the_command_line_wins(in_folder, capsys):
+    path = write("box.ply", shapes.inverted(shapes.box()))
+    (in_folder / "sss.toml").write_text('ignore = ["SSS204"]\nmaterial = "marble"\nunit = "cm"\n')
+    assert main([path]) == 0
+    assert main([path, "--isolated"]) == 1
+    assert main([path, "--ignore", "SSS101"]) == 1
+    (in_folder / "sss.toml").write_text('severity = { SSS204 = "info", SSS101 = "info" }\njobs = 1\n')
+    assert main([path]) == 0
+    assert main([path, "--severity", "SSS204=error"]) == 1
+    (in_folder / "sss.toml").write_text('per-path-ignores = { "*.ply" = ["SSS2"] }\n')
+    assert main([path, "--ignore", "SSS101"]) == 0
+    (in_folder / "sss.toml").write_text('select = ["SSS1"]\n')
+    assert main([path]) == 0
+    assert main([path, "--select", "SSS2"]) == 1
+
+
+def test_each_mesh_has_the_configuration_nearest_to_it(in_folder, capsys):
+    for name in ("a", "b"):
+        (in_folder / name).mkdir()
+        write(f"{name}/box.ply", shapes.inverted(shapes.box()))
+    (in_folder / "b" / "pyproject.toml").write_text('[tool.sss-check]\nseverity = { SSS204 = "info" }\n')
+    _, data = run_json(capsys, ".")
+    severities = [rule["severity"] for mesh in data["meshes"] for rule in mesh["rules"] if rule["code"] == "SSS204"]
+    assert severities == ["error", "info"]
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["selct = []", 'unit = "furlong"', 'material = "marbel"', "jobs = 0", "= 1", 'material = "missing.toml"'],
+)
+def test_a_bad_configuration_is_one_line_and_status_two(in_folder, capsys, text):
+    write("box.ply", shapes.box())
+    (in_folder / "sss.toml").write_text(text)
+    assert main(["box.ply"]) == 2
+    captured = capsys.readouterr()
+    assert captured.err.startswith("sss-check: error: ") and captured.err.count("\n") == 1
+    assert "sss.toml" in captured.err and captured.out == ""
+
+
+def test_a_scheduler_that_is_not_there_is_one_line_and_status_two(in_folder, capsys, monkeypatch):
+    cluster = pytest.importorskip("sss_tools.cluster")
+    pytest.importorskip("distributed")
+    monkeypatch.setattr(cluster, "CONNECT", 0.5)
+    assert main([write("box.ply", shapes.box()), "--scheduler", "tcp://127.0.0.1:9"]) == 2
+    captured = capsys.readouterr()
+    assert captured.err.startswith("sss-check: error: --scheduler tcp://127.0.0.1:9: ")
+    assert captured.err.count("\n") == 1
+
+
+def test_without_distributed_the_scheduler_option_says_what_to_install(in_folder, capsys, monkeypatch):
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    assert main([write("box.ply", shapes.box()), "--scheduler", "tcp://127.0.0.1:9"]) == 2
+    captured = capsys.readouterr()
+    assert "pip install 'sss-tools[cluster]'" in captured.err and captured.err.count("\n") == 1

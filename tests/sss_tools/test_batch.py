@@ -5,7 +5,7 @@ import time
 import pytest
 
 from sss_tools import shapes
-from sss_tools.batch import check_files, find_meshes
+from sss_tools.batch import Task, check_files, check_tasks, find_meshes
 from sss_tools.errors import InputError
 from sss_tools.validation.outcome import Outcome
 from sss_tools.validation.settings import Settings
@@ -14,6 +14,8 @@ from sss_tools.writing import write_mesh
 SABOTAGE = """
 import os, signal, time
 from sss_tools.validation.run import check_file
+
+time.sleep(float(os.environ.get("SABOTAGE_START", 0)))
 
 def check(path, settings):
     name = os.path.basename(path)
@@ -30,6 +32,9 @@ def check(path, settings):
         raise KeyError("deep inside")
     if "memory" in name:
         raise MemoryError
+    if "greedy" in name:
+        import numpy
+        numpy.ones(2**27)
     if "noise" in name:
         print("noise on stdout", flush=True)
         os.write(1, b"native noise")
@@ -81,6 +86,32 @@ def test_an_error_of_the_check_itself_is_status_two_and_running_out_of_memory_is
     faulty, large = check_files(boxes(tmp_path, "raise", "memory"), Settings(), jobs=1, check=sabotage)
     assert "KeyError" in faulty.error and faulty.exit_status == 2
     assert "out of memory" in large.error and large.exit_status == 0
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="other systems do not keep limits of data")
+def test_a_mesh_that_takes_more_memory_than_allowed_is_not_run_and_the_next_is_checked(tmp_path, sabotage):
+    greedy, sound = boxes(tmp_path, "greedy", "b")
+    # the array takes 1 GiB
+    (allowed,) = check_files([greedy], Settings(), check=sabotage)
+    assert allowed.status == "ok"
+    refused, checked = check_files([greedy, sound], Settings(), jobs=1, check=sabotage, max_memory=2**30)
+    assert "out of memory: it needs more than 1 GiB" in refused.error and refused.exit_status == 0
+    assert {rule.outcome for rule in refused.rules} == {Outcome.NOT_RUN}
+    assert checked.status == "ok"
+
+
+def test_the_time_a_worker_takes_to_start_is_not_the_meshs(tmp_path, sabotage, monkeypatch):
+    monkeypatch.setenv("SABOTAGE_START", "7")
+    (report,) = check_files(boxes(tmp_path, "a"), Settings(), timeout=6, check=sabotage)
+    assert report.status == "ok"
+
+
+def test_the_reports_of_many_meshes_wait_on_disk(tmp_path):
+    reports = check_tasks([Task(path, Settings()) for path in boxes(tmp_path, "a", "b")])
+    assert not isinstance(reports, list)
+    assert [os.path.basename(report.path) for report in reports] == ["a.ply", "b.ply"]
+    # each access reads it anew
+    assert reports[0] is not reports[0] and reports[0] == reports[0]
 
 
 def test_nothing_a_worker_prints_reaches_stdout(tmp_path, sabotage, capfd):

@@ -1,0 +1,98 @@
+"""From the options of sss-check and the configuration files to the meshes to check, each with its settings."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+
+from sss_tools.configuration import Configuration, Configurations, code_of, codes_of
+from sss_tools.errors import InputError
+from sss_tools.medium import Medium
+from sss_tools.validation.outcome import Severity
+from sss_tools.validation.settings import Settings
+from sss_tools.worker import TIMEOUT, Task
+
+from .materials import medium_of
+
+
+class TaskMaker:
+    """Makes the task of each mesh. The command line wins over configuration files.
+
+    jobs  meshes checked at a time: as the command line says, else as the strictest configuration met so far
+
+    Raises InputError for options and configuration files that cannot be used.
+    """
+
+    def __init__(self, options: argparse.Namespace):
+        self._options = options
+        self._configurations = Configurations()
+        self._select = _codes(options.select, "--select")
+        self._ignore = _codes(options.ignore, "--ignore")
+        self._severities = _severities(options.severity)
+        self._media: dict[tuple[str, str], Medium] = {}
+        self.jobs: int | None = options.jobs
+        if options.material is not None:
+            self._medium(options.material, options.unit, Configuration())
+
+    def task(self, mesh: str) -> Task:
+        """The task for a mesh file."""
+        options = self._options
+        configuration = Configuration() if options.isolated else self._configurations.of(mesh)
+        if options.jobs is None and configuration.jobs is not None:
+            self.jobs = min(self.jobs or configuration.jobs, configuration.jobs)
+        material = options.material or configuration.material
+        unit = options.unit or configuration.unit
+        settings = Settings(
+            select=self._select or configuration.select,
+            ignore=(self._ignore or configuration.ignore) + configuration.ignored_for(mesh),
+            severities={**configuration.severity, **self._severities},
+            material=material,
+            medium=None if material is None else self._medium(material, unit, configuration),
+            unit=unit,
+            record=options.record,
+        )
+        return Task(
+            mesh,
+            settings,
+            options.timeout or configuration.timeout or TIMEOUT,
+            options.max_memory or configuration.max_memory,
+        )
+
+    def _medium(self, name: str, unit: str | None, configuration: Configuration) -> Medium:
+        key = name, unit or "mm"
+        if key not in self._media:
+            source = "--material" if self._options.material is not None else f"{configuration.source}: material"
+            self._media[key] = medium_of(*key, source)
+        return self._media[key]
+
+
+def _codes(texts: Sequence[str], option: str) -> tuple[str, ...]:
+    """Codes and beginnings of codes from comma-separated lists; each must mean at least one rule."""
+    try:
+        codes = codes_of(",".join(texts))
+    except ValueError as error:
+        raise InputError(f"{option} {error}", "no rule has such a code", "use for example SSS1 or SSS101") from None
+    if texts and not codes:
+        raise InputError(option, "no code given", "use for example SSS1 or SSS101,SSS203")
+    return codes
+
+
+def _severities(texts: Sequence[str]) -> dict[str, Severity]:
+    severities = {}
+    for text in texts:
+        code, _, level = text.partition("=")
+        if level.lower() not in list(Severity):
+            raise InputError(f"--severity {text}", "not CODE=LEVEL", "use for example SSS202=error")
+        severities[rule_code(code)] = Severity(level.lower())
+    return severities
+
+
+def rule_code(text: str) -> str:
+    """The code of the rule with this code or name. Raises InputError where there is none."""
+    try:
+        return code_of(text)
+    except ValueError:
+        from sss_tools.validation.rule import all_rules
+
+        codes = ", ".join(rule.code for rule in all_rules())
+        raise InputError(text, "no such rule", f"use one of {codes}") from None
