@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from sss_tools.configuration import Configuration, Configurations, code_of, codes_of
 from sss_tools.errors import InputError
 from sss_tools.medium import Medium
-from sss_tools.validation.outcome import Severity
+from sss_tools.validation.outcome import UNUSABLE, Severity
 from sss_tools.validation.settings import Settings
 from sss_tools.worker import TIMEOUT, Task
 
@@ -29,6 +29,7 @@ class TaskMaker:
         self._select = _codes(options.select, "--select")
         self._ignore = _codes(options.ignore, "--ignore")
         self._severities = _severities(options.severity)
+        self._waive = _waivers(options)
         self._media: dict[tuple[str, str], Medium] = {}
         self.jobs: int | None = options.jobs
         if options.material is not None:
@@ -50,6 +51,8 @@ class TaskMaker:
             medium=None if material is None else self._medium(material, unit, configuration),
             unit=unit,
             record=options.record,
+            waive=self._waive,
+            cache=not options.no_cache,
         )
         return Task(
             mesh,
@@ -85,6 +88,17 @@ def _severities(texts: Sequence[str]) -> dict[str, Severity]:
             raise InputError(f"--severity {text}", "not CODE=LEVEL", "use for example SSS202=error")
         severities[rule_code(code)] = Severity(level.lower())
     return severities
+
+
+def _waivers(options: argparse.Namespace) -> dict[str, str]:
+    codes = [rule_code(code.strip()) for text in options.waive for code in text.split(",") if code.strip()]
+    reason = (options.reason or "").strip()
+    if bool(options.waive) != bool(reason):
+        raise InputError("--waive", "goes with --reason", 'give both: --waive SSS402 --reason "baked decimation"')
+    for code in codes:
+        if code in UNUSABLE:
+            raise InputError(f"--waive {code}", "a file that cannot be used cannot be waived", "repair the file")
+    return dict.fromkeys(codes, reason)
 
 
 def rule_code(text: str) -> str:

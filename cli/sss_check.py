@@ -93,12 +93,16 @@ def _parser() -> ArgumentParser:
     add("--fix-out", metavar="DIR", help="where repaired copies go (not available yet)")
     add("--diff", action="store_true", help="say what a fix would change (not available yet)")
     add("--record", action=argparse.BooleanOptionalAction, default=False, help="write MESH.sss.json beside it")
+    add("--waive", metavar="CODES", action="append", default=[], help="accept these findings: with --record for as "
+        "long as the geometry stays the same, else in this run")  # fmt: skip
+    add("--reason", metavar="TEXT", help="why they are accepted; kept and shown with them")
     add("--explain", metavar="CODE", help="say what a rule finds and why that matters, and exit")
     add("--statistics", action="store_true", help="add how often each rule found something")
     add("--jobs", type=_positive_int, metavar="N", help="meshes checked at a time (default: one a processor)")
     add("--scheduler", metavar="ADDRESS", help="check on the Dask cluster with this scheduler")
     add("--timeout", type=_positive, metavar="S", help="seconds a mesh may take (default 300)")
     add("--max-memory", type=_size, metavar="SIZE", help="memory a mesh may take: 500M, 2G (default: no limit)")
+    add("--no-cache", action="store_true", help="check again what was checked before")
     add("--isolated", action="store_true", help="read no configuration file")
     add("--exit-zero", action="store_true", help="findings do not change the exit status")
     return parser

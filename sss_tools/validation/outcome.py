@@ -79,6 +79,7 @@ class MeshReport:
     object      the name of the scene's object that was looked at, where the mesh was checked as part of a scene
     closedness, components  as in CONTRACTS section 1; None and [] where they could not be found out
     warnings    what went wrong beside the check (an unwritable record), one line each
+    cached      the findings were known from an earlier check of the same geometry
     seconds     wall time
     """
 
@@ -96,6 +97,7 @@ class MeshReport:
     components: list[dict[str, Any]] = field(default_factory=list)
     rules: list[RuleReport] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
+    cached: bool = False
     seconds: float = 0.0
 
     @property

@@ -13,7 +13,8 @@ from ..errors import InputError
 from ..loading import load_mesh
 from ..medium import Medium
 from ..mesh import Mesh
-from ..record import write_record
+from ..record import geometry_hash, write_record
+from ..waivers import waive
 from .outcome import UNUSABLE, FixSafety, MeshReport, Outcome, RuleReport
 from .rule import Context, Finding, NotRun, Rule, Subject, all_rules
 from .settings import Settings
@@ -44,13 +45,33 @@ def check_file(path: str | Path, settings: Settings | None = None) -> MeshReport
     medium = settings.medium
     if medium is None and settings.material is not None:
         medium = Medium.preset(settings.material, settings.unit or "mm")
-    report = check_mesh(mesh, Context(medium, settings.unit), settings, path)
+    report = _known_or_checked(mesh, Context(medium, settings.unit), settings, path)
+    waivers = waive(report, path, settings)
     if settings.record and report.closedness is not None:
         try:
-            write_record(path, mesh, report, settings.material)
+            write_record(path, mesh, report, settings.material, medium, settings.unit, waivers=waivers)
         except OSError as error:
             report.warnings.append(f"{path}: the record could not be written ({error.strerror or error})")
     report.seconds = time.perf_counter() - start
+    return report
+
+
+def _known_or_checked(mesh: Mesh, context: Context, settings: Settings, path: str | Path) -> MeshReport:
+    """The report on a mesh, from the cache where that is wanted and it is there."""
+    digest = geometry_hash(mesh)
+    report = key = None
+    if settings.cache:
+        from .. import findings_cache
+
+        key = findings_cache.key_of(mesh, digest, context, settings)
+        report = findings_cache.recall(key)
+    if report is None:
+        report = check_mesh(mesh, context, settings, path)
+        if key is not None:
+            findings_cache.keep(key, report)
+    else:
+        report.path, report.cached = str(path), True
+    report.hash = digest
     return report
 
 

@@ -23,6 +23,8 @@ class Settings:
     medium          coefficients per mesh unit, of a material that is no preset
     unit            what one mesh unit is: mm, cm, m, inch; None where it was not said (presets then take mm)
     record          whether to write MESH.sss.json beside each mesh
+    waive           code -> reason: findings that the user accepts, beside those waived in the record
+    cache           whether to look for the findings among, and keep them with, those of earlier runs
     """
 
     select: tuple[str, ...] = ()
@@ -32,6 +34,8 @@ class Settings:
     medium: Medium | None = None
     unit: str | None = None
     record: bool = False
+    waive: Mapping[str, str] = field(default_factory=dict)
+    cache: bool = False
 
     def wants(self, code: str) -> bool:
         """Whether a rule is to run: selected, and not ignored by as long a prefix or a longer one."""

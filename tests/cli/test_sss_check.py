@@ -31,6 +31,12 @@ BAD_FILES = {
 }
 
 
+@pytest.fixture(autouse=True)
+def own_cache(tmp_path_factory, monkeypatch):
+    """No test sees what another, or the user, has checked before."""
+    monkeypatch.setenv("SSS_TOOLS_CACHE", str(tmp_path_factory.mktemp("cache")))
+
+
 @pytest.fixture
 def in_folder(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
@@ -157,6 +163,11 @@ def test_what_comes_later_is_refused_and_not_ignored(in_folder, capsys, argument
         ["box.ply", "--jobs", "many"],
         ["box.ply", "--timeout", "-1"],
         ["box.ply", "--timeout", "nan"],
+        ["box.ply", "--waive", "SSS204"],
+        ["box.ply", "--reason", "none"],
+        ["box.ply", "--waive", "SSS204", "--reason", " "],
+        ["box.ply", "--waive", "SSS2", "--reason", "a prefix is no rule"],
+        ["box.ply", "--waive", "SSS702", "--reason", "whatever"],
         ["box.ply", "--max-memory", "much"],
         ["box.ply", "--max-memory", "0G"],
         ["box.ply", "--material", "missing.toml"],
@@ -371,3 +382,51 @@ def test_without_distributed_the_scheduler_option_says_what_to_install(in_folder
     assert main([write("box.ply", shapes.box()), "--scheduler", "tcp://127.0.0.1:9"]) == 2
     captured = capsys.readouterr()
     assert "pip install 'sss-tools[cluster]'" in captured.err and captured.err.count("\n") == 1
+
+
+def test_a_finding_is_waived_with_a_reason_and_stays_so_in_the_record(in_folder, capsys):
+    path = write("box.ply", shapes.inverted(shapes.box()))
+    assert main([path, "--waive", "inverted-shell", "--reason", "by design"]) == 0
+    assert main([path]) == 1, "without a record it holds for one run"
+    assert listing() == ["box.ply"]
+    assert main([path, "--waive", "SSS204", "--reason", "by design", "--record"]) == 0
+    capsys.readouterr()
+    status, data = run_json(capsys, path)
+    (rule,) = (rule for rule in data["meshes"][0]["rules"] if rule["code"] == "SSS204")
+    assert (status, rule["outcome"], rule["reason"]) == (0, "waived", "by design")
+    record = json.loads((in_folder / "box.ply.sss.json").read_text())
+    assert record["waivers"] == [{"code": "SSS204", "reason": "by design"}]
+    # writing the record again keeps them
+    assert main([path, "--record"]) == 0
+    assert json.loads((in_folder / "box.ply.sss.json").read_text())["waivers"] == record["waivers"]
+
+
+def test_a_waiver_is_never_applied_to_other_geometry(in_folder, capsys):
+    path = write("box.ply", shapes.inverted(shapes.box()))
+    main([path, "--waive", "SSS204", "--reason", "by design", "--record"])
+    write("box.ply", shapes.inverted(shapes.box(2.0)))
+    capsys.readouterr()
+    assert main([path]) == 1
+    assert "waivers of SSS204 belong to other geometry and are not applied" in capsys.readouterr().err
+    assert main([path, "--record"]) == 1
+    assert "are dropped" in capsys.readouterr().err
+    assert main([path]) == 1
+    assert capsys.readouterr().err == ""
+
+
+def test_waiving_what_was_not_found_is_a_warning_and_not_recorded(in_folder, capsys):
+    path = write("box.ply", shapes.box())
+    assert main([path, "--waive", "SSS204", "--reason", "by design", "--record"]) == 0
+    assert "nothing to waive: SSS204" in capsys.readouterr().err
+    assert json.loads((in_folder / "box.ply.sss.json").read_text())["waivers"] == []
+
+
+def test_what_was_checked_before_is_not_checked_again(in_folder, capsys):
+    path = write("box.ply", shapes.inverted(shapes.box()))
+    first, second, third = (run_json(capsys, path, *options)[1]["meshes"][0] for options in ((), (), ("--no-cache",)))
+    assert [mesh["cached"] for mesh in (first, second, third)] == [False, True, False]
+    varying = {"seconds", "cached"}
+    for other in (second, third):
+        assert {key: other[key] for key in other.keys() - varying} == {
+            key: first[key] for key in first.keys() - varying
+        }

@@ -1,6 +1,7 @@
 import os
 import sys
 import time
+from pathlib import Path
 
 import pytest
 
@@ -109,7 +110,7 @@ def test_the_time_a_worker_takes_to_start_is_not_the_meshs(tmp_path, sabotage, m
 def test_the_reports_of_many_meshes_wait_on_disk(tmp_path):
     reports = check_tasks([Task(path, Settings()) for path in boxes(tmp_path, "a", "b")])
     assert not isinstance(reports, list)
-    assert [os.path.basename(report.path) for report in reports] == ["a.ply", "b.ply"]
+    assert [Path(report.path).name for report in reports] == ["a.ply", "b.ply"]
     # each access reads it anew
     assert reports[0] is not reports[0] and reports[0] == reports[0]
 

@@ -137,7 +137,7 @@ def test_json_has_the_promised_shape_for_every_kind_of_mesh(tmp_path):
     assert "repair" not in data["meshes"][0]
     # nothing of the program's own gets out
     assert set(data["meshes"][0]["rules"][0]) == set(RULE["required"])
-    assert set(data["meshes"][0]) == {*MESH["required"], "warnings", "hash", "object"}
+    assert set(data["meshes"][0]) == {*MESH["required"], "warnings", "hash", "object", "cached"}
 
 
 def test_the_schema_of_this_test_can_fail(tmp_path):
