@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 from sss_tools.configuration import Configuration, Configurations, code_of, codes_of
 from sss_tools.errors import InputError
@@ -14,11 +15,15 @@ from sss_tools.worker import TIMEOUT, Task
 
 from .materials import medium_of
 
+if TYPE_CHECKING:
+    from .check_scene import SceneMesh, SceneMeshes
+
 
 class TaskMaker:
     """Makes the task of each mesh. The command line wins over configuration files.
 
-    jobs  meshes checked at a time: as the command line says, else as the strictest configuration met so far
+    jobs           meshes checked at a time: as the command line says, else as the strictest configuration met so far
+    outside_scene  meshes met so far that the scene of ``--scene`` does not show
 
     Raises InputError for options and configuration files that cannot be used.
     """
@@ -32,24 +37,50 @@ class TaskMaker:
         self._waive = _waivers(options)
         self._media: dict[tuple[str, str], Medium] = {}
         self.jobs: int | None = options.jobs
+        self._scene = None if options.scene is None else self._read_scene(options.scene)
+        self.outside_scene: list[str] = []
         if options.material is not None:
             self._medium(options.material, options.unit, Configuration())
 
-    def task(self, mesh: str) -> Task:
-        """The task for a mesh file."""
+    def tasks(self, path: str) -> list[Task]:
+        """The tasks for a mesh file or a scene: one an object, where there is a scene, else one."""
+        if path.lower().endswith(".toml"):
+            return [self._task(entry.path, entry) for entry in self._read_scene(path).all()]
+        entries = [] if self._scene is None else self._scene.of(path)
+        if entries:
+            return [self._task(path, entry) for entry in entries]
+        if self._scene is not None:
+            self.outside_scene.append(path)
+        return [self._task(path, None)]
+
+    def _read_scene(self, path: str) -> SceneMeshes:
+        from .check_scene import SceneMeshes
+
+        for option in ("material", "unit"):
+            if getattr(self._options, option) is not None:
+                raise InputError(f"--{option}", "is for meshes without a scene", f"set it in {path}, or leave it out")
+        return SceneMeshes(path)
+
+    def _task(self, mesh: str, placed: SceneMesh | None) -> Task:
+        """The task for a mesh file; what a scene says of it goes before what a configuration says."""
         options = self._options
         configuration = Configuration() if options.isolated else self._configurations.of(mesh)
         if options.jobs is None and configuration.jobs is not None:
             self.jobs = min(self.jobs or configuration.jobs, configuration.jobs)
-        material = options.material or configuration.material
-        unit = options.unit or configuration.unit
+        material: str | None
+        if placed is not None:
+            material, unit, medium = placed.material, placed.unit, placed.medium
+        else:
+            material, unit = options.material or configuration.material, options.unit or configuration.unit
+            medium = None if material is None else self._medium(material, unit, configuration)
         settings = Settings(
             select=self._select or configuration.select,
             ignore=(self._ignore or configuration.ignore) + configuration.ignored_for(mesh),
             severities={**configuration.severity, **self._severities},
             material=material,
-            medium=None if material is None else self._medium(material, unit, configuration),
+            medium=medium,
             unit=unit,
+            surroundings=None if placed is None else placed.surroundings,
             record=options.record,
             waive=self._waive,
             cache=not options.no_cache,

@@ -38,13 +38,13 @@ def _check(argv: Sequence[str] | None) -> int:
 
     maker = TaskMaker(options)
     paths = find_meshes(options.paths, sys.stdin if "-" in options.paths else ())
-    for path in paths:
-        if path.lower().endswith(".toml"):
-            raise unavailable(path, "name the meshes of the scene instead; checking scenes comes later")
-    refuse_to_overwrite(options.output, paths)
     if not paths:
         raise InputError("-", "the list on stdin names no mesh", "give one path a line")
-    tasks = [maker.task(path) for path in paths]
+    tasks = [task for path in paths for task in maker.tasks(path)]
+    refuse_to_overwrite(options.output, [*paths, *(task.path for task in tasks)])
+    if not options.quiet:
+        for path in maker.outside_scene:
+            complain(PROGRAM, f"{path}: is not in {options.scene}; it is checked by itself", "warning")
     with progress(len(tasks), "checking", options.quiet) as advance:
         reports = check_tasks(
             tasks, maker.jobs, done=lambda report: advance(1, report.path), scheduler=options.scheduler
@@ -78,9 +78,10 @@ def _parser() -> ArgumentParser:
         "[tool.sss-check] in pyproject.toml, the nearest upwards from each mesh, else from the working directory.",
     )
     add = parser.add_argument
-    add("paths", nargs="*", metavar="PATH", help="a mesh file, a folder (recursively), or - for a list on stdin")
+    add("paths", nargs="*", metavar="PATH", help="a mesh file, a folder (recursively), a scene (all its objects), "
+        "or - for a list on stdin")  # fmt: skip
     add("--material", metavar="NAME|FILE", help="what the meshes are made of: a preset, or a TOML file")
-    add("--scene", metavar="SCENE.toml", help="take materials and neighbours from a scene (not available yet)")
+    add("--scene", metavar="SCENE.toml", help="give the meshes the materials, scale and neighbours they have there")
     add("--format", choices=FORMATS, default="full", help="how to report (default: full)")
     add("-o", "--output", metavar="FILE", help="write the report there instead of to stdout")
     add("--unit", choices=("mm", "cm", "m", "inch"), help="what one mesh unit is")
@@ -110,7 +111,7 @@ def _parser() -> ArgumentParser:
 
 def _refuse_what_comes_later(options: argparse.Namespace) -> None:
     """Nothing that was asked for is ignored in silence."""
-    for name in ("scene", "fix", "unsafe_fixes", "fix_out", "diff"):
+    for name in ("fix", "unsafe_fixes", "fix_out", "diff"):
         if getattr(options, name):
             raise unavailable("--" + name.replace("_", "-"))
 

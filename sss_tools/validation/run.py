@@ -22,6 +22,9 @@ from .settings import Settings
 LISTED = 1000
 """How many indices of each kind a report lists; beyond that it is ``truncated``."""
 
+OPAQUE = "opaque in this scene: no light enters it"
+"""Why rules about the inside do not run on floors and walls."""
+
 FAULTS = (
     *(ArithmeticError, AssertionError, AttributeError, LookupError, NotImplementedError),
     *(OSError, RuntimeError, TypeError, ValueError),
@@ -42,18 +45,32 @@ def check_file(path: str | Path, settings: Settings | None = None) -> MeshReport
         report = _report_unreadable(path, error, settings)
         report.seconds = time.perf_counter() - start
         return report
-    medium = settings.medium
-    if medium is None and settings.material is not None:
-        medium = Medium.preset(settings.material, settings.unit or "mm")
-    report = _known_or_checked(mesh, Context(medium, settings.unit), settings, path)
+    context, problems = _context(mesh, settings)
+    report = _known_or_checked(mesh, context, settings, path)
+    report.warnings += problems
+    if settings.surroundings is not None:
+        report.object = settings.surroundings.placed.name
     waivers = waive(report, path, settings)
     if settings.record and report.closedness is not None:
         try:
-            write_record(path, mesh, report, settings.material, medium, settings.unit, waivers=waivers)
+            write_record(path, mesh, report, settings.material, context.medium, settings.unit, waivers=waivers)
         except OSError as error:
             report.warnings.append(f"{path}: the record could not be written ({error.strerror or error})")
     report.seconds = time.perf_counter() - start
     return report
+
+
+def _context(mesh: Mesh, settings: Settings) -> tuple[Context, list[str]]:
+    """What is known besides the mesh, and what went wrong finding it out, one line each."""
+    medium = settings.medium
+    if medium is None and settings.material is not None:
+        medium = Medium.preset(settings.material, settings.unit or "mm")
+    surroundings = settings.surroundings
+    if surroundings is None:
+        return Context(medium, settings.unit), []
+    neighbours, problems = surroundings.neighbours()
+    opaque = not surroundings.placed.translucent
+    return Context(medium, settings.unit, neighbours, surroundings.pixel_footprint(mesh), opaque), problems
 
 
 def _known_or_checked(mesh: Mesh, context: Context, settings: Settings, path: str | Path) -> MeshReport:
@@ -90,10 +107,11 @@ def check_mesh(
     report = MeshReport(str(path or mesh.path or ""), vertices=len(mesh.vertices), faces=len(mesh.faces))
     subject = Subject(mesh, context)
     blocked = None
+    opaque = OPAQUE if subject.context.opaque else None
     # numbers too large or small for double precision are findings, not warnings on the terminal
     with np.errstate(all="ignore"):
         for rule in sorted(all_rules(), key=lambda rule: not rule.on_file):
-            result = _run(rule, subject, settings, None if rule.on_file else blocked)
+            result = _run(rule, subject, settings, None if rule.on_file else blocked or opaque)
             report.rules.append(result)
             if result.outcome == Outcome.FAIL and rule.code in UNUSABLE:
                 blocked = f"{rule.name}: {result.message}"

@@ -10,6 +10,7 @@ from .outcome import Severity
 
 if TYPE_CHECKING:
     from ..medium import Medium
+    from ..surroundings import Surroundings
 
 
 @dataclass(frozen=True)
@@ -22,6 +23,7 @@ class Settings:
     material        name of a preset, or what reports and records call ``medium``; None where nothing was said
     medium          coefficients per mesh unit, of a material that is no preset
     unit            what one mesh unit is: mm, cm, m, inch; None where it was not said (presets then take mm)
+    surroundings    the mesh's place in a scene, where there is one
     record          whether to write MESH.sss.json beside each mesh
     waive           code -> reason: findings that the user accepts, beside those waived in the record
     cache           whether to look for the findings among, and keep them with, those of earlier runs
@@ -33,6 +35,7 @@ class Settings:
     material: str | None = None
     medium: Medium | None = None
     unit: str | None = None
+    surroundings: Surroundings | None = None
     record: bool = False
     waive: Mapping[str, str] = field(default_factory=dict)
     cache: bool = False

@@ -136,7 +136,6 @@ def test_a_folder_is_searched_and_a_list_is_read_from_stdin(in_folder, capsys, m
         ["--unsafe-fixes"],
         ["--diff"],
         ["--fix-out", "out"],
-        ["--scene", "scene.toml"],
     ],
 )
 def test_what_comes_later_is_refused_and_not_ignored(in_folder, capsys, arguments):
@@ -175,6 +174,7 @@ def test_what_comes_later_is_refused_and_not_ignored(in_folder, capsys, argument
         ["box.ply", "-q", "-v"],
         ["--explain", "SSS999"],
         ["scene.toml"],
+        ["box.ply", "--scene", "missing.toml"],
         ["box.ply", "-o", "no/such/folder/report.json"],
         ["box.ply", "-o", "box.ply"],
         ["box.ply", "-o", "./../" + "."],

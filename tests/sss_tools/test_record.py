@@ -37,7 +37,7 @@ def test_a_record_lies_beside_its_mesh_and_says_what_was_found(recorded):
 
 
 def test_a_record_holds_all_that_was_promised(recorded):
-    path, mesh = recorded
+    path, _ = recorded
     data = json.loads(record_path(path).read_text())
     assert set(data) == {
         *("schema", "hash", "rules", "material", "medium", "unit"),
