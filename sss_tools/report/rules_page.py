@@ -15,8 +15,8 @@ This page is written by `python -m sss_tools.report.rules_page` from the rules t
 
 - **error**: light cannot be right in such a solid. **warning**: it may well be wrong. **info**: good to know.
 - A **safe** fix keeps the shape, an **unsafe** one may invent or remove surface and is done on request only.
-- A rule ends as `pass`, `fail`, `waived` or `not-run`, with the reason. SSS602, SSS701 and SSS702 say that a file cannot
-  be used at all; they always run and cannot be waived.
+- A rule ends as `pass`, `fail`, `waived` or `not-run`, with the reason. SSS602, SSS701 and SSS702 say that a file
+  cannot be used at all; they always run and cannot be waived.
 """
 _FIXES = {FixSafety.SAFE: "safe", FixSafety.UNSAFE: "unsafe", FixSafety.NONE: "by hand"}
 

@@ -1,5 +1,8 @@
+import tracemalloc
+
 import pytest
 
+from sss_tools.report import json_report
 from sss_tools.report_spool import ReportSpool
 from sss_tools.validation.outcome import MeshReport
 
@@ -17,3 +20,18 @@ def test_reports_come_back_in_order_whatever_the_order_they_came_in():
 def test_a_report_that_was_not_put_is_not_made_up():
     with pytest.raises(IndexError):
         _ = ReportSpool(1)[0]
+
+
+def test_a_report_on_many_meshes_is_never_in_memory_as_a_whole():
+    count, size = 200, 100_000
+    spool = ReportSpool(count)
+    tracemalloc.start()
+    try:
+        for number in range(count):
+            spool.put(number, MeshReport(f"{number}.ply", warnings=["w" * size]))
+        written = sum(len(chunk) for chunk in json_report.chunks(spool, "1", 1.0))
+        _, peak = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    # one report is copied a few times on its way into text; all of them would be 20 MB
+    assert written > count * size and peak < 20 * size
