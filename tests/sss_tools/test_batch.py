@@ -1,4 +1,5 @@
 import os
+import subprocess
 import sys
 import time
 from pathlib import Path
@@ -26,6 +27,8 @@ def check(path, settings):
         signal.signal(signal.SIGSEGV, signal.SIG_DFL)
         os.kill(os.getpid(), signal.SIGSEGV)
     if "hang" in name:
+        with open(path + ".pid", "w") as file:
+            file.write(str(os.getpid()))
         time.sleep(600)
     if "exit" in name:
         os._exit(7)
@@ -81,6 +84,41 @@ def test_a_check_that_hangs_is_stopped_and_the_next_mesh_is_checked(tmp_path, sa
     assert "took longer than 8 s" in hung.error and hung.exit_status == 0
     assert sound.status == "ok" and sound.rules[0].outcome == Outcome.PASS
     assert time.monotonic() - start < 60
+
+
+@pytest.mark.skipif(os.name != "posix", reason="signals")
+def test_a_worker_does_not_outlive_the_command_that_is_killed(tmp_path, sabotage):
+    (path,) = boxes(tmp_path, "hang")
+    code = (
+        "import sys; from sabotaged_check import check; from sss_tools.batch import check_files;"
+        "from sss_tools.validation.settings import Settings; check_files([sys.argv[1]], Settings(), check=check)"
+    )
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(entry or "." for entry in sys.path)}
+    command = subprocess.Popen([sys.executable, "-c", code, path], env=environment)
+    note = Path(path + ".pid")
+    assert eventually(lambda: note.exists() and note.read_text())
+    worker = int(note.read_text())
+    assert is_running(worker)
+    command.kill()
+    command.wait()
+    assert eventually(lambda: not is_running(worker))
+
+
+def eventually(condition, seconds=60.0):
+    end = time.monotonic() + seconds
+    while not (holds := condition()) and time.monotonic() < end:
+        time.sleep(0.05)
+    return holds
+
+
+def is_running(process):
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return False
+    # an orphan that nobody has asked about is dead, too
+    state = Path(f"/proc/{process}/stat")
+    return not (state.exists() and state.read_text().rsplit(")", 1)[1].split()[0] == "Z")
 
 
 def test_an_error_of_the_check_itself_is_status_two_and_running_out_of_memory_is_not(tmp_path, sabotage):

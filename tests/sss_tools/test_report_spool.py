@@ -17,6 +17,15 @@ def test_reports_come_back_in_order_whatever_the_order_they_came_in():
     assert [report.path for report in spool[1:]] == ["1.ply", "2.ply"]
 
 
+def test_reports_may_come_in_while_others_are_read():
+    spool = ReportSpool(3)
+    spool.put(0, MeshReport("0.ply", warnings=["w" * 1000]))
+    spool.put(1, MeshReport("1.ply"))
+    assert spool[0].path == "0.ply"
+    spool.put(2, MeshReport("2.ply"))
+    assert [report.path for report in spool] == ["0.ply", "1.ply", "2.ply"]
+
+
 def test_a_report_that_was_not_put_is_not_made_up():
     with pytest.raises(IndexError):
         _ = ReportSpool(1)[0]
