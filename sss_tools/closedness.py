@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .interior import Interior, Shell, find_interior, winding_in_shells
+from .intersection import self_intersections
 from .mesh import Mesh
 from .patches import orient_consistently, patch_of_face
 from .topology import Topology
@@ -76,7 +77,7 @@ class Closedness:
     manifold            no edge has more than two faces, and no point joins several fans
     oriented            neighbours agree, and the normals of solids point outwards
     internal_geometry   surface found inside a solid that bounds no cavity
-    self_intersecting   None where nobody looked
+    self_intersecting   faces pass through each other or touch; None where nobody looked
     boundary_loops      connected components of the graph of boundary edges, in the whole file
     holes               the loops of components that enclose volume
     hole_area_fraction  area of the holes over the mesh's area
@@ -117,6 +118,7 @@ class Assessment:
     loop_is_hole        (l,) whether each of the topology's boundary loops bounds a hole
     interior            what lies inside solids
     component_of_face   (m,) as in the topology
+    self_intersections  (p, 2) pairs of faces that meet elsewhere than in a common side or corner
     """
 
     closedness: Closedness
@@ -125,6 +127,7 @@ class Assessment:
     loop_is_hole: NDArray[np.bool_]
     interior: Interior
     component_of_face: NDArray[np.int64]
+    self_intersections: NDArray[np.int64]
 
     @property
     def volume(self) -> float | None:
@@ -148,6 +151,7 @@ def assess(mesh: Mesh) -> Assessment:
     if not np.isfinite(mesh.vertices[mesh.faces]).all():
         raise ValueError("closedness needs finite coordinates")
     topology = mesh.topology
+    intersecting = self_intersections(topology)
     parts = _Parts(topology)
     roles, inverted = _roles(parts)
     components = tuple(
@@ -171,7 +175,7 @@ def assess(mesh: Mesh) -> Assessment:
         manifold=manifold,
         oriented=oriented,
         internal_geometry=internal,
-        self_intersecting=None,
+        self_intersecting=len(intersecting) > 0,
         boundary_loops=len(topology.boundary_loops),
         holes=holes,
         hole_area_fraction=sum(hole.area for hole in holes) / mesh.area if holes else 0.0,
@@ -179,7 +183,9 @@ def assess(mesh: Mesh) -> Assessment:
             state, manifold and oriented and not internal, all(_is_simple(topology, loop) for loop in loops)
         ),
     )
-    return Assessment(closedness, components, inverted, loop_is_hole, interior, topology.component_of_face)
+    return Assessment(
+        closedness, components, inverted, loop_is_hole, interior, topology.component_of_face, intersecting
+    )
 
 
 def _handling(state: State, flawless: bool, simple_loops: bool) -> Handling:
