@@ -33,6 +33,11 @@ FLAT = 1e-3
 two sheets back to back are closed, too."""
 
 
+FOLD = 0.02
+"""Share of a component's area that may lie in folds where it passes through itself and still is no internal
+geometry: such a fold is a self-intersection and nothing more."""
+
+
 @dataclass(frozen=True)
 class Hole:
     """One boundary loop of a component that encloses volume.
@@ -158,7 +163,7 @@ def assess(mesh: Mesh) -> Assessment:
         Component(len(faces), role, bool(closed), float(volume) if closed else None)
         for faces, role, closed, volume in zip(parts.groups, roles, parts.closed, parts.volumes, strict=True)
     )
-    interior = _interior(parts)
+    interior = _interior(parts, intersecting)
     loop_is_hole = np.array(
         [parts.encloses[parts.component_of_edge[loop[0]]] for loop in topology.boundary_loops], bool
     )
@@ -282,17 +287,34 @@ def _roles(parts: _Parts) -> tuple[list[Role], NDArray[np.bool_]]:
     return roles, inverted
 
 
-def _interior(parts: _Parts) -> Interior:
-    """What lies inside solids; nothing can where a single closed manifold component is all there is."""
-    if parts.count < 2 and len(parts.topology.nonmanifold_edges) == 0:
+def _interior(parts: _Parts, intersecting: NDArray[np.int64]) -> Interior:
+    """What lies inside solids; nothing can where a single manifold component that meets itself nowhere is all.
+
+    intersecting  (p, 2) pairs of faces that meet others
+    """
+    cut = np.unique(intersecting)
+    if parts.count < 2 and len(parts.topology.nonmanifold_edges) == 0 and len(cut) == 0:
         return Interior()
-    return find_interior(
-        parts.points,
-        parts.faces,
-        patch_of_face(parts.topology),
-        parts.shells,
-        parts.topology.component_of_face,
+    component = parts.topology.component_of_face
+    found = find_interior(parts.points, parts.faces, patch_of_face(parts.topology, cut), parts.shells, component, cut)
+    # components that meet themselves and nothing else
+    both = component[intersecting]
+    folded = np.setdiff1d(both, both[both[:, 0] != both[:, 1]])
+    small = [number for number in folded if _share(parts, found, number) < FOLD]
+    return Interior(
+        tuple(patch for patch in found.patches if component[patch[0]] not in small),
+        found.faces[~np.isin(component[found.faces], small)],
+        found.skipped,
     )
+
+
+def _share(parts: _Parts, found: Interior, number: int) -> float:
+    """How much of a component's area, at most, lies inside."""
+    faces = np.concatenate([*found.patches, found.faces])
+    faces = faces[parts.topology.component_of_face[faces] == number]
+    corners = parts.points[parts.faces[faces]]
+    vectors = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    return float(np.linalg.norm(vectors, axis=1).sum() / 2 / parts.areas[number])
 
 
 def _is_simple(topology: Topology, loop: NDArray[np.int64]) -> bool:

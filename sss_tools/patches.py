@@ -8,19 +8,24 @@ from numpy.typing import NDArray
 from .topology import Topology, connected_components
 
 
-def patch_of_face(topology: Topology) -> NDArray[np.int64]:
+def patch_of_face(topology: Topology, left_out: NDArray[np.int64] | None = None) -> NDArray[np.int64]:
     """(m,) the patch of each face: faces joined over edges with exactly two faces; -1 for faces not live.
 
+    left_out  faces that belong to no patch and join none
     Patches end at boundary and non-manifold edges. All of a patch lies on one side of everything it does not
-    pass through.
+    pass through: without the faces that meet others, on one side of everything.
     """
-    if len(topology.nonmanifold_edges) == 0:
+    cut = ~topology.live
+    if left_out is not None:
+        cut[left_out] = True
+    if not cut[topology.live].any() and len(topology.nonmanifold_edges) == 0:
         return topology.component_of_face
     left, right = (side // 3 for side in topology.side_pairs)
-    patch = connected_components(len(topology.faces), left, right)
-    patch[~topology.live] = -1
-    # live faces keep consecutive numbers
-    patch[topology.live] = np.unique(patch[topology.live], return_inverse=True)[1]
+    joined = ~(cut[left] | cut[right])
+    patch = connected_components(len(topology.faces), left[joined], right[joined])
+    patch[cut] = -1
+    # the others keep consecutive numbers
+    patch[~cut] = np.unique(patch[~cut], return_inverse=True)[1]
     return patch
 
 
