@@ -151,7 +151,7 @@ def test_json_of_a_hollow_ball_is_a_solid_and_a_cavity():
     mesh = json_report.mesh_object(check_mesh(shapes.hollow_ball()))
     assert [part["role"] for part in mesh["components"]] == ["solid", "cavity"]
     assert (mesh["closedness"]["state"], mesh["closedness"]["hole_handling"]) == ("closed", "strict")
-    assert mesh["closedness"]["self_intersecting"] is None
+    assert mesh["closedness"]["self_intersecting"] is False
 
 
 def test_concise_has_one_line_a_finding(tmp_path):
