@@ -83,7 +83,7 @@ class Topology:
             return []
         used, compact = np.unique(ends, return_inverse=True)
         compact = compact.reshape(-1, 2)
-        label = _components(len(used), compact[:, 0], compact[:, 1])[compact[:, 0]]
+        label = connected_components(len(used), compact[:, 0], compact[:, 1])[compact[:, 0]]
         order = np.argsort(label, kind="stable")
         cuts = np.flatnonzero(np.diff(label[order])) + 1
         return sorted(np.split(self.boundary_edges[order], cuts), key=lambda loop: (-len(loop), loop[0]))
@@ -95,7 +95,7 @@ class Topology:
         Faces belong together that share an edge, whatever its number of faces; a shared point is not enough.
         """
         face = self._sides // 3
-        label = _components(len(self.faces), face[:-1][self._same_edge], face[1:][self._same_edge])
+        label = connected_components(len(self.faces), face[:-1][self._same_edge], face[1:][self._same_edge])
         component = np.full(len(self.faces), -1, np.int64)
         live_labels = label[self.live]
         _, first, inverse = np.unique(live_labels, return_index=True, return_inverse=True)
@@ -120,7 +120,7 @@ class Topology:
         forward = self.side_direction.ravel()[side]
         # side k touches corners k and k + 1; sort the two by the edge's direction so that they match up
         tail, head = np.where(forward, side, following), np.where(forward, following, side)
-        label = _components(
+        label = connected_components(
             len(corner_point),
             np.concatenate([tail[:-1][self._same_edge], head[:-1][self._same_edge]]),
             np.concatenate([tail[1:][self._same_edge], head[1:][self._same_edge]]),
@@ -182,10 +182,9 @@ def _number_runs(ordered: Indices) -> tuple[Indices, Indices]:
     return np.cumsum(starts) - 1, ordered[starts]
 
 
-def _components(count: int, a: Indices, b: Indices) -> Indices:
+def connected_components(count: int, a: Indices, b: Indices) -> Indices:
     """(count,) component labels of the undirected graph with ``count`` nodes and links a[i] - b[i]."""
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
+    from scipy.sparse import coo_array, csgraph
 
     links = coo_array((np.ones(len(a), bool), (a, b)), shape=(count, count))
-    return connected_components(links, directed=False)[1].astype(np.int64)
+    return csgraph.connected_components(links, directed=False)[1].astype(np.int64)

@@ -1,0 +1,4 @@
+"""placeholder"""
+from .draft import Declined
+def rebuild(draft):
+    raise Declined("later")
