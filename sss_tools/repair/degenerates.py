@@ -84,7 +84,8 @@ def _one_round(points, faces, birth, flat, tolerance):
         if not _runs(faces[other], b, a):
             continue  # the neighbours disagree on outside: not before they are turned
         pair = np.array([[a, far[0], tip], [far[0], b, tip]])
-        if len(_flat_faces(points, pair, tolerance)) > 1:
+        # fewer flat faces than before, or the next round would flip it back
+        if len(_flat_faces(points, pair, tolerance)) >= len(_flat_faces(points, faces[shared], tolerance)):
             continue
         faces[face], faces[other] = pair
         birth = birth.copy()

@@ -8,6 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from ..closedness import Assessment, assess
 from ..mesh import Body, Mesh
 from ..topology import Topology
 
@@ -51,6 +52,11 @@ class Draft:
     def topology(self) -> Topology:
         """Over ``mesh``."""
         return self.mesh.topology
+
+    @cached_property
+    def assessment(self) -> Assessment:
+        """Components, roles and holes of ``mesh``. Raises ValueError where no face is left."""
+        return assess(self.mesh)
 
     @property
     def diagonal(self) -> float:

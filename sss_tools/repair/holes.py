@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ..closedness import ENCLOSES, assess
+from ..closedness import ENCLOSES
 from .draft import Declined, Draft
 from .fairing import fair, refine
 from .judge import count_crossing_faces
@@ -14,6 +14,9 @@ from .unite import directed_balance
 
 SMOOTH_FROM = 12
 """Loops of at least so many edges that do not lie in a plane get a refined, faired cap."""
+
+ENCLOSES_BESIDE = 0.6
+"""Least winding number, somewhere, of an open sheet that is capped beside solids: half is what a flat one reaches."""
 
 GRID = 20
 """Places along each side of the box where a sheet is asked whether it encloses anything."""
@@ -53,17 +56,21 @@ def missing_loops(draft: Draft) -> list[NDArray[np.int64]]:
 
 
 def enclosing_components(draft: Draft) -> NDArray[np.bool_]:
-    """(c,) which components enclose a volume, caps supplied: roles other than sheet, or sheets that all but do."""
-    assessment = assess(draft.mesh)
+    """(c,) which components enclose a volume, caps supplied: roles other than sheet, or sheets that all but do.
+
+    A sheet beside solids (a spout, a handle) needs to enclose less than one that is all there is.
+    """
+    assessment = draft.assessment
     fit = np.array([part.role != "sheet" for part in assessment.components], bool)
+    least = ENCLOSES_BESIDE if fit.any() else ENCLOSES
     for number in np.flatnonzero(~fit):
         faces = draft.topology.faces[assessment.component_of_face == number]
-        fit[number] = len(faces) > 3 and _winds_round_something(draft.topology.points, faces)
+        fit[number] = len(faces) > 3 and _winds_round_something(draft.topology.points, faces, least)
     return fit
 
 
-def _winds_round_something(points, faces) -> bool:
-    """Whether the winding number of the faces reaches ``ENCLOSES`` somewhere on a grid in their box."""
+def _winds_round_something(points, faces, least: float) -> bool:
+    """Whether the winding number of the faces reaches ``least`` somewhere on a grid in their box."""
     from igl import fast_winding_number
 
     used, compact = np.unique(faces, return_inverse=True)
@@ -76,7 +83,7 @@ def _winds_round_something(points, faces) -> bool:
     centre = (lower + upper) / 2
     places = lower + grid * (upper - lower) - centre
     winding = fast_winding_number(corners - centre, compact.reshape(-1, 3), places)
-    return bool(np.nanmax(np.abs(winding)) >= ENCLOSES)
+    return bool(np.nanmax(np.abs(winding)) >= least)
 
 
 def _simple_loops(directed: NDArray[np.int64]) -> list[NDArray[np.int64]]:
@@ -113,10 +120,12 @@ def _with_caps(draft: Draft, loops: list[NDArray[np.int64]], smooth: bool) -> Dr
     topology = draft.topology
     points, faces, birth = [draft.mesh.vertices], [topology.faces], [draft.birth]
     count, added, refused = len(draft.mesh.vertices), 0, 0
-    existing = set(map(tuple, topology.edges.tolist())) if loops else set()
+    on_rim = np.zeros(len(topology.points), bool)
+    on_rim[np.concatenate(loops)] = True
+    chords = topology.edges[on_rim[topology.edges].all(axis=1)]
     rim_face = _face_of_edge(topology)
     for loop in loops:
-        cap = triangulate_loop(topology.points[loop], _existing_chords(loop, existing))
+        cap = triangulate_loop(topology.points[loop], _existing_chords(loop, chords))
         if cap is None:
             refused += 1
             continue
@@ -128,7 +137,7 @@ def _with_caps(draft: Draft, loops: list[NDArray[np.int64]], smooth: bool) -> Dr
         number = np.concatenate([loop, count + np.arange(len(corners) - len(loop))])
         points.append(corners[len(loop) :])
         faces.append(number[triangles])
-        existing.update(map(tuple, np.sort(_edges(number[triangles]), axis=1).tolist()))
+        chords = np.concatenate([chords, _edges(number[triangles])])
         birth.append(_nearest_rim_face(draft, topology, loop, corners[triangles].mean(axis=1), rim_face))
         count += len(corners) - len(loop)
         added += len(triangles)
@@ -136,17 +145,18 @@ def _with_caps(draft: Draft, loops: list[NDArray[np.int64]], smooth: bool) -> Dr
     return Draft(draft.source, np.concatenate(points), np.concatenate(faces), np.concatenate(birth), what)
 
 
-def _edges(faces):
+def _edges(faces: NDArray[np.int64]) -> NDArray[np.int64]:
     return np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
 
 
-def _existing_chords(loop: NDArray[np.int64], existing: set) -> NDArray[np.bool_]:
+def _existing_chords(loop: NDArray[np.int64], edges: NDArray[np.int64]) -> NDArray[np.bool_]:
     """(n, n) pairs of the loop's points that are joined by an edge already: a chord there would be a third face."""
-    place = {int(point): k for k, point in enumerate(loop)}
+    place = np.full(int(max(edges.max(), loop.max())) + 1, -1)
+    place[loop] = np.arange(len(loop))
+    a, b = place[edges].T
+    both = (a >= 0) & (b >= 0)
     taken = np.zeros((len(loop), len(loop)), bool)
-    for a, b in existing:
-        if a in place and b in place:
-            taken[place[a], place[b]] = taken[place[b], place[a]] = True
+    taken[a[both], b[both]] = taken[b[both], a[both]] = True
     return taken
 
 

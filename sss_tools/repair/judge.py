@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..closedness import Assessment, assess
 from ..mesh import Mesh
 from ..rays import RAY_OFFSET, RayCaster, UnitFrame
 from .draft import Draft
@@ -19,6 +18,8 @@ FARTHEST = 0.01
 
 SAMPLES = 3000
 LOOKS = 24
+SEEN = 2
+"""From so many of ``LOOKS`` directions a point must be seen: one alone is a glance through a hole at what is inside."""
 
 FAULTS = ("open_edges", "non_manifold_edges", "pinches", "disagreeing_edges", "inverted", "duplicates", "crossings")
 """The fields of ``Condition`` that count faults which no rung may add to, unless a later one sees to them."""
@@ -79,11 +80,6 @@ class Examined:
         return self.draft.mesh
 
     @cached_property
-    def assessment(self) -> Assessment:
-        """Roles and holes. Raises ValueError where no face is left."""
-        return assess(self.mesh)
-
-    @cached_property
     def crossings(self) -> int | None:
         """How many faces pass through others."""
         return count_crossing_faces(self.mesh)
@@ -91,7 +87,7 @@ class Examined:
     @cached_property
     def condition(self) -> Condition:
         """Everything counted."""
-        topology, roles = self.mesh.topology, [part.role for part in self.assessment.components]
+        topology, roles = self.mesh.topology, [part.role for part in self.draft.assessment.components]
         corners = np.sort(topology.faces[topology.live], axis=1)
         return Condition(
             faces=len(self.mesh.faces),
@@ -101,13 +97,13 @@ class Examined:
             non_manifold_edges=len(topology.nonmanifold_edges),
             pinches=len(topology.pinched_points),
             disagreeing_edges=len(topology.misoriented_edges),
-            inverted=int(self.assessment.inverted.sum()),
+            inverted=int(self.draft.assessment.inverted.sum()),
             duplicates=len(corners) - len(_distinct(corners)),
             degenerates=int((~topology.live).sum()),
             crossings=self.crossings,
             solids=roles.count("solid"),
             cavities=roles.count("cavity"),
-            internal=roles.count("internal") + len(self.assessment.interior.patches),
+            internal=roles.count("internal") + len(self.draft.assessment.interior.patches),
             sheets=roles.count("sheet"),
         )
 
@@ -149,7 +145,7 @@ class VisibleSurface:
 
 
 def _visible_points(mesh: Mesh) -> NDArray[np.float64]:
-    """Points spread evenly over the area from which a ray in one of ``LOOKS`` directions leaves the box freely."""
+    """Points spread evenly over the area from which rays in ``SEEN`` of ``LOOKS`` directions leave freely."""
     faces = mesh.faces[mesh.topology.live]
     areas = mesh.face_areas[mesh.topology.live]
     if len(faces) == 0 or areas.sum() <= 0:
@@ -175,7 +171,7 @@ def _visible_points(mesh: Mesh) -> NDArray[np.float64]:
     blocked = caster.occluded(
         np.ascontiguousarray(origin.reshape(-1, 3).T, np.float32), np.ascontiguousarray(rays.reshape(-1, 3).T, np.float32)
     )
-    return points[~blocked.reshape(len(points), -1).all(axis=1)]
+    return points[(~blocked.reshape(len(points), -1)).sum(axis=1) >= SEEN]
 
 
 def _directions(count: int) -> NDArray[np.float64]:

@@ -18,7 +18,7 @@ from .nonmanifold import split_non_manifold
 from .orientation import orient
 from .rebuild import rebuild
 from .result import Repair, Rung
-from .unite import remove_internal, unite
+from .unite import remove_internal, unite, unite_both_signs
 from .weld import weld
 
 PASSES = 3
@@ -33,6 +33,7 @@ class Step:
     """A rung.
 
     take      the rung itself: a new draft, None where there is nothing to do; Declined where it cannot
+    instead   what to try where ``take`` did harm
     wanted    whether it is to be tried on a mesh in this condition
     leaves    faults it may add to, because a later rung sees to them
     safe      keeps the shape: allowed with ``--fix``
@@ -40,6 +41,7 @@ class Step:
 
     name: str
     take: Callable[[Draft], Draft | None]
+    instead: Callable[[Draft], Draft | None] | None = None
     wanted: Callable[[Examined], bool] = lambda examined: True
     leaves: tuple[str, ...] = ()
     safe: bool = False
@@ -65,12 +67,12 @@ STEPS = (
     Step("duplicates", remove_duplicates, leaves=("disagreeing_edges",), safe=True),
     Step("orientation", orient, safe=True),
     Step(
-        "caps", cap_holes, _has_open_edges, ("crossings", "non_manifold_edges", "pinches", "duplicates", "inverted")
+        "caps", cap_holes, None, _has_open_edges, ("crossings", "non_manifold_edges", "pinches", "duplicates", "inverted")
     ),
-    Step("internal", remove_internal, lambda examined: examined.condition.internal + examined.condition.sheets > 0),
-    Step("unite", unite, _is_tangled, ("non_manifold_edges", "pinches")),
-    Step("split", split_non_manifold),
-    Step("rebuild", rebuild, _is_no_solid),
+    Step("internal", remove_internal, None, lambda examined: examined.condition.internal + examined.condition.sheets > 0),
+    Step("unite", unite, unite_both_signs, _is_tangled, ("non_manifold_edges", "pinches")),
+    Step("split", split_non_manifold, leaves=("inverted",)),
+    Step("rebuild", rebuild, None, _is_no_solid),
 )
 
 
@@ -97,6 +99,8 @@ class _Climb:
         self.rungs: dict[str, Rung] = {}
         self._visible: VisibleSurface | None = None
         self.seconds: dict[str, float] = {}
+        self._idle: set[tuple[str, int]] = set()
+        self._drafts: list[Examined] = [self.now]
 
     @property
     def visible(self) -> VisibleSurface:
@@ -149,6 +153,7 @@ class _Climb:
         if self.now is not start and (after.crossings or 0) > (before.crossings or 0):
             changed = [name for name, rung in self.rungs.items() if rung.status == "applied"]
             self.now = start
+            self._drafts.append(start)
             for name in changed:
                 if noted.get(name, Rung(name, "skipped")).status != "applied":
                     self.rungs[name] = Rung(name, "undone", "the result would cross itself")
@@ -156,8 +161,14 @@ class _Climb:
 
     def _take(self, step: Step) -> None:
         """Try a rung; keep what it made if that is better."""
+        if (step.name, len(self._drafts)) in self._idle and self.now is self._drafts[-1]:
+            return  # tried on this very draft before
         started = time.perf_counter()
         rung = self._try(step)
+        if rung.status == "applied":
+            self._drafts.append(self.now)
+        else:
+            self._idle.add((step.name, len(self._drafts)))
         self.seconds[step.name] = self.seconds.get(step.name, 0) + time.perf_counter() - started
         earlier = self.rungs.get(step.name)
         # a later climb that finds nothing more to do does not take back what was done
@@ -167,8 +178,15 @@ class _Climb:
     def _try(self, step: Step) -> Rung:
         if not step.wanted(self.now):
             return Rung(step.name, "skipped", "nothing to do")
+        rung = self._attempt(step, step.take)
+        if rung.status == "undone" and step.instead is not None:
+            other = self._attempt(step, step.instead)
+            return other if other.status == "applied" else rung
+        return rung
+
+    def _attempt(self, step: Step, take: Callable[[Draft], Draft | None]) -> Rung:
         try:
-            draft = step.take(self.now.draft)
+            draft = take(self.now.draft)
         except Declined as reason:
             return Rung(step.name, "skipped", str(reason))
         except ImportError as error:
@@ -181,6 +199,8 @@ class _Climb:
         harm = self._harm(step, after)
         if harm:
             return Rung(step.name, "undone", harm)
+        if not step.safe and after.condition.faults() == self.now.condition.faults():
+            return Rung(step.name, "skipped", "it would not help")
         self.now = after
         return Rung(step.name, "applied", draft.note)
 

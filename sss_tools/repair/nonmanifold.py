@@ -27,6 +27,12 @@ def split_non_manifold(draft: Draft) -> Draft | None:
     if len(topology.nonmanifold_edges) == 0 and len(topology.pinched_points) == 0:
         return None
     faces, fan_point, split = _fans(topology)
+    still = _still_shared(topology, faces)
+    if len(still):
+        # both ends hold together by other ways: a point in the middle lets the sheets part there
+        draft = _with_middles(draft, still)
+        topology = draft.topology
+        faces, fan_point, split = _fans(topology)
     if len(split) == 0:
         return None
     best, fewest = None, None
@@ -39,6 +45,45 @@ def split_non_manifold(draft: Draft) -> Draft | None:
         if fewest == 0:
             break
     return best
+
+
+def _still_shared(topology, faces) -> NDArray[np.int64]:
+    """The non-manifold edges of ``topology`` two sheets of which run between the same points of ``faces``."""
+    shared = np.isin(topology.face_edges, topology.nonmanifold_edges)
+    face, side = np.nonzero(shared)
+    ends = np.sort(np.stack([faces[face, side], faces[face, (side + 1) % 3]], axis=1), axis=1)
+    _, which, uses = np.unique(ends, axis=0, return_inverse=True, return_counts=True)
+    return np.unique(topology.face_edges[face, side][uses[which.ravel()] > 2])
+
+
+def _with_middles(draft: Draft, edges) -> Draft:
+    """The draft with a new point in the middle of each of the topology's ``edges``, all faces there cut in two."""
+    topology = draft.topology
+    middle_of = {
+        tuple(ends): len(topology.points) + number for number, ends in enumerate(topology.edges[edges].tolist())
+    }
+    points = np.concatenate([draft.mesh.vertices, topology.points[topology.edges[edges]].mean(axis=1)])
+    cut = np.isin(topology.face_edges, edges).any(axis=1)
+    faces, birth = [], []
+    for face in np.flatnonzero(cut):
+        waiting = [tuple(topology.faces[face].tolist())]
+        while waiting:
+            corner = waiting.pop()
+            for k in range(3):
+                a, b, c = corner[k], corner[(k + 1) % 3], corner[(k + 2) % 3]
+                middle = middle_of.get((min(a, b), max(a, b)))
+                if middle is not None:
+                    waiting += [(a, middle, c), (middle, b, c)]
+                    break
+            else:
+                faces.append(corner)
+                birth.append(draft.birth[face])
+    return Draft(
+        draft.source,
+        points,
+        np.concatenate([topology.faces[~cut], np.array(faces, np.int64).reshape(-1, 3)]),
+        np.concatenate([draft.birth[~cut], np.array(birth, np.int64)]),
+    )
 
 
 def _fans(topology) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:

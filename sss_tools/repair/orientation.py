@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ..closedness import assess
+from ..closedness import Assessment, assess
 from ..mesh import Mesh
 from ..patches import orient_consistently, patch_of_face
 from ..topology import Topology
@@ -20,8 +20,9 @@ def orient(draft: Draft) -> Draft | None:
     topology = draft.topology
     faces, _ = orient_consistently(topology)
     faces = _balanced(topology, faces)
-    mesh = Mesh(topology.points, faces)
-    inverted = _inverted_components(mesh)
+    turned = (faces != topology.faces).any()
+    mesh = Mesh(topology.points, faces) if turned else draft.mesh
+    inverted = _inverted_components(assess(mesh) if turned else draft.assessment)
     if len(inverted):
         turn = np.isin(mesh.topology.component_of_face, inverted)
         faces = np.where(turn[:, None], faces[:, ::-1], faces)
@@ -32,9 +33,8 @@ def orient(draft: Draft) -> Draft | None:
     return draft.with_faces(faces, what + (f", {len(inverted)} shells inside out" if len(inverted) else ""))
 
 
-def _inverted_components(mesh: Mesh) -> NDArray[np.int64]:
+def _inverted_components(assessment: Assessment) -> NDArray[np.int64]:
     """Solids inside out, and what lies inside them: a void in such a solid is as inverted as the solid itself."""
-    assessment = assess(mesh)
     sign = assessment.sign
     roles = np.array([part.role for part in assessment.components])
     # how the surroundings wind round a component follows from its sign and role

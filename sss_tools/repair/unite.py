@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ..closedness import assess
+from ..topology import Topology, weld_exactly
 from ..winding import spread_by_area, winding_numbers
 from .draft import Declined, Draft
 
@@ -18,7 +18,7 @@ SPECK = 1e-12
 
 def remove_internal(draft: Draft) -> Draft | None:
     """Drop components that lie inside a solid and bound no cavity, and sheets that lie wholly inside one."""
-    assessment = assess(draft.mesh)
+    assessment = draft.assessment
     roles = [part.role for part in assessment.components]
     drop = [number for number, role in enumerate(roles) if role == "internal"]
     sheets = [number for number, role in enumerate(roles) if role == "sheet"]
@@ -54,32 +54,68 @@ def unite(draft: Draft) -> Draft | None:
     Raises Declined where the surface is not closed (an edge is run through more often one way than the other):
     then the winding number is no whole number.
     """
-    topology = draft.topology
-    if (directed_balance(topology) != 0).any():
+    topology = _closed(draft)
+    faces, birth = topology.faces[topology.live], draft.birth[topology.live]
+    return _as_draft(draft, _boundary_of_matter(topology.points, faces, birth))
+
+
+def unite_both_signs(draft: Draft) -> Draft | None:
+    """As ``unite``, with matter also where the winding number is negative.
+
+    For surfaces that cross themselves so that a part of them is inside out: the part is there to be seen, and no
+    turning of whole components sets it right.
+    """
+    topology = _closed(draft)
+    faces, birth = topology.faces[topology.live], draft.birth[topology.live]
+    halves = []
+    for turned in (faces, faces[:, ::-1]):
+        try:
+            halves.append(_boundary_of_matter(topology.points, turned, birth))
+        except Declined:
+            continue
+    if not halves:
+        raise Declined("nothing encloses a volume")
+    points = np.concatenate([half[0] for half in halves])
+    offset = len(halves[0][0])
+    faces = np.concatenate([half[1] + number * offset for number, half in enumerate(halves)])
+    birth = np.concatenate([half[2] for half in halves])
+    return _as_draft(draft, _boundary_of_matter(points, faces, birth))
+
+
+def _closed(draft: Draft) -> Topology:
+    if (directed_balance(draft.topology) != 0).any():
         raise Declined("the surface is not closed")
+    return draft.topology
+
+
+def _boundary_of_matter(points, faces, birth):
+    """Points, faces and births of the boundary of where the winding number is 1 or more."""
     try:
         from igl.copyleft.cgal import mesh_boolean
     except ImportError:
         raise Declined("needs the package libigl: install it") from None
-    points, faces, birth = topology.points, topology.faces[topology.live], draft.birth[topology.live]
     nothing = np.zeros((0, 3)), np.zeros((0, 3), np.int64)
-    before = len(faces)
     for _ in range(ROUNDS):
         points, faces, origin = mesh_boolean(np.array(points), np.array(faces), *nothing, "union")
-        birth = birth[origin]
-        points, faces, birth = _joined(points, faces, birth)
+        points, faces, birth = _joined(points, faces, birth[origin])
         if len(faces) == 0:
             raise Declined("nothing encloses a volume")
         if not _crosses(points, faces):
             break
+    return points, faces, birth
+
+
+def _as_draft(draft: Draft, united) -> Draft:
+    points, faces, birth = united
     faces, birth, specks = _without_specks(points, faces, birth, SPECK * draft.diagonal**3)
     if len(faces) == 0:
         raise Declined("nothing encloses a volume")
+    before = int(draft.topology.live.sum())
     what = f"{before} faces became {len(faces)}" + (f", {specks} specks dropped" if specks else "")
     return Draft(draft.source, points, faces, birth, what)
 
 
-def directed_balance(topology) -> NDArray[np.int64]:
+def directed_balance(topology: Topology) -> NDArray[np.int64]:
     """(e,) how much oftener each edge is run through from its lesser point than from its greater one."""
     sides = topology.face_edges[topology.live].ravel()
     direction = np.where(topology.side_direction[topology.live].ravel(), 1, -1)
@@ -88,8 +124,6 @@ def directed_balance(topology) -> NDArray[np.int64]:
 
 def _joined(points, faces, birth):
     """Points that rounding made equal joined, faces that vanish with that dropped."""
-    from ..topology import weld_exactly
-
     point, first = weld_exactly(points)
     faces = point[faces]
     a, b, c = faces.T
