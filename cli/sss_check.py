@@ -46,6 +46,12 @@ def _check(argv: Sequence[str] | None) -> int:
     for path in paths:
         if path.lower().endswith(".toml"):
             raise unavailable(path, "name the meshes of the scene instead; checking scenes comes later")
+    if settings.fix:
+        from dataclasses import replace
+
+        from sss_tools.repair.output import plan_outputs
+
+        settings = replace(settings, outputs=plan_outputs(paths, options.paths, options.fix_out))
     if options.output not in (None, "-", "/dev/stdout"):
         _refuse_to_overwrite(options.output, paths)
     if not paths:
@@ -65,6 +71,8 @@ def _check(argv: Sequence[str] | None) -> int:
                 complain(PROGRAM, warning, "warning")
     _write(_render(options, reports, time.perf_counter() - start), options.output)
     status = max((report.exit_status for report in reports), default=0)
+    if options.diff and any(report.repair and report.repair["after"] for report in reports):
+        status = max(status, 1)
     return 0 if status == 1 and options.exit_zero else status
 
 
@@ -86,10 +94,10 @@ def _parser() -> ArgumentParser:
     add("--ignore", metavar="CODES", action="append", default=[], help="leave these out (SSS602, SSS70x always run)")
     add("--severity", metavar="CODE=LEVEL", action="append", default=[], help="error, warning or info instead")
     fix = parser.add_mutually_exclusive_group()
-    fix.add_argument("--fix", action="store_true", help="write a repaired copy (not available yet)")
-    fix.add_argument("--unsafe-fixes", action="store_true", help="the same, inventing surface (not available yet)")
-    add("--fix-out", metavar="DIR", help="where repaired copies go (not available yet)")
-    add("--diff", action="store_true", help="say what a fix would change (not available yet)")
+    fix.add_argument("--fix", action="store_true", help="write a repaired copy, STEM.fixed.EXT, of what can be repaired safely")
+    fix.add_argument("--unsafe-fixes", action="store_true", help="the same, and close holes, unite, split, rebuild")
+    add("--fix-out", metavar="DIR", help="where repaired copies go, the folders mirrored")
+    add("--diff", action="store_true", help="write nothing, say what a fix would change; exit 1 if anything")
     add("--record", action=argparse.BooleanOptionalAction, default=False, help="write MESH.sss.json beside it")
     add("--explain", metavar="CODE", help="say what a rule finds and why that matters, and exit")
     add("--statistics", action="store_true", help="add how often each rule found something")
@@ -102,7 +110,7 @@ def _parser() -> ArgumentParser:
 
 def _refuse_what_comes_later(options: argparse.Namespace) -> None:
     """Nothing that was asked for is ignored in silence."""
-    for name in ("scene", "fix", "unsafe_fixes", "fix_out", "diff", "scheduler"):
+    for name in ("scene", "scheduler"):
         if getattr(options, name):
             raise unavailable("--" + name.replace("_", "-"))
     if options.format in LATER_FORMATS:
@@ -121,6 +129,9 @@ def _settings(options: argparse.Namespace) -> Settings:
 
         if options.material not in PRESETS:
             raise InputError(f"--material {options.material}", "no such preset", f"use {', '.join(PRESETS)}")
+    fix = "unsafe" if options.unsafe_fixes else "safe" if options.fix or options.diff else ""
+    if options.fix_out is not None and not fix:
+        raise InputError("--fix-out", "there is nothing to write without a fix", "add --fix or --unsafe-fixes")
     return Settings(
         select=_codes(options.select, "--select"),
         ignore=_codes(options.ignore, "--ignore"),
@@ -128,6 +139,8 @@ def _settings(options: argparse.Namespace) -> Settings:
         material=options.material,
         unit=options.unit,
         record=options.record,
+        fix=fix,
+        diff=options.diff,
     )
 
 

@@ -15,9 +15,17 @@ def render(reports: Sequence[MeshReport]) -> str:
 
 def lines(report: MeshReport) -> list[str]:
     """The lines of one mesh."""
-    found = [f"{report.path}:{rule.code} {rule.severity} {rule.message}" for rule in report.findings]
-    if not found and report.error is not None:
+    found = [_repair(report)] if report.repair is not None else []
+    found += [f"{report.path}:{rule.code} {rule.severity} {rule.message}" for rule in report.findings]
+    if not report.findings and report.error is not None:
         return [f"{report.path}:not-run {report.error.removeprefix(f'{report.path}: ')}"]
     return found + [
         f"{report.path}:{rule.code} {Outcome.NOT_RUN} {rule.reason}" for rule in report.rules if rule.raised
     ]
+
+
+def _repair(report: MeshReport) -> str:
+    """What became of the mesh, on one line."""
+    repair = report.repair or {}
+    detail = repair["output"] or repair["reason"]
+    return f"{report.path}:repair {repair['status']}" + (f" {detail}" if detail else "")

@@ -76,6 +76,8 @@ class MeshReport:
     status      "ok", or "unreadable" where no mesh came out of the file
     error       one line saying why the file cannot be used, or None
     closedness, components  as in CONTRACTS section 1; None and [] where they could not be found out
+    repair      what became of it, as in CONTRACTS section 1; None where nobody asked. All the rest is then about
+                the result, where one was written
     warnings    what went wrong beside the check (an unwritable record), one line each
     seconds     wall time
     """
@@ -91,6 +93,7 @@ class MeshReport:
     closedness: dict[str, Any] | None = None
     components: list[dict[str, Any]] = field(default_factory=list)
     rules: list[RuleReport] = field(default_factory=list)
+    repair: dict[str, Any] | None = None
     warnings: list[str] = field(default_factory=list)
     seconds: float = 0.0
 

@@ -42,7 +42,12 @@ def check_file(path: str | Path, settings: Settings | None = None) -> MeshReport
         report.seconds = time.perf_counter() - start
         return report
     medium = Medium.preset(settings.material, settings.unit or "mm") if settings.material else None
-    report = check_mesh(mesh, Context(medium, settings.unit), settings, path)
+    context = Context(medium, settings.unit)
+    report = check_mesh(mesh, context, settings, path)
+    if settings.fix and report.error is None:
+        report, result = _repaired(path, mesh, context, report, settings)
+        if settings.record and result is not None and report.repair is not None:
+            path, mesh = report.repair["output"], result
     if settings.record and report.closedness is not None:
         try:
             write_record(path, mesh, report, settings.material)
@@ -80,6 +85,26 @@ def check_mesh(
             _describe(subject, report)
     report.seconds = time.perf_counter() - start
     return report
+
+
+def _repaired(
+    path: str | Path, mesh: Mesh, context: Context, report: MeshReport, settings: Settings
+) -> tuple[MeshReport, Mesh | None]:
+    """The report on the repaired mesh, and that mesh; the one at hand and None where there is no result."""
+    from ..repair.file import repair_file
+
+    place = settings.outputs.get(str(path), str(Path(path).with_suffix(".fixed")))
+    result, repair, failure = repair_file(mesh, place, settings.fix == "unsafe", settings.diff)
+    repair.before["findings"] = {finding.code: finding.count for finding in report.findings}
+    if result is not None:
+        checked = check_mesh(result, context, settings, path)
+        repair.after["findings"] = {finding.code: finding.count for finding in checked.findings}
+        if not settings.diff:
+            report = checked
+    report.repair = repair.to_json()
+    if failure is not None:
+        report.warnings.append(f"{failure.line()}")
+    return report, None if settings.diff else result
 
 
 def report_not_checked(path: str | Path, reason: str, settings: Settings, raised: bool = False) -> MeshReport:

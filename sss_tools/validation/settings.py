@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Literal
 
 from .outcome import Severity
 
@@ -18,6 +19,9 @@ class Settings:
     material        name of a preset, or None
     unit            what one mesh unit is: mm, cm, m, inch; None where it was not said (presets then take mm)
     record          whether to write MESH.sss.json beside each mesh
+    fix             "safe" or "unsafe": repair each mesh and check the result; "" leaves meshes alone
+    diff            repair, but write nothing
+    outputs         path of a mesh -> where its repaired copy goes, without extension (``repair.plan_outputs``)
     """
 
     select: tuple[str, ...] = ()
@@ -26,6 +30,9 @@ class Settings:
     material: str | None = None
     unit: str | None = None
     record: bool = False
+    fix: Literal["", "safe", "unsafe"] = ""
+    diff: bool = False
+    outputs: Mapping[str, str] = field(default_factory=dict)
 
     def wants(self, code: str) -> bool:
         """Whether a rule is to run: selected, and not ignored by as long a prefix or a longer one."""
