@@ -285,7 +285,9 @@ def table(rows: list[dict[str, str]], results: dict[str, dict[str, Result]], mes
             result = found[row["file"]]
             detail = f" ({result.detail})" if result.detail and result.outcome == "closed" else ""
             cells.append(f"{result.outcome}{detail}, {result.seconds:.2f} s")
-        lines.append(f"| {row['file']} | {row['class']} | {len(meshes[row['file']].faces)} | " + " | ".join(cells) + " |")
+        lines.append(
+            f"| {row['file']} | {row['class']} | {len(meshes[row['file']].faces)} | " + " | ".join(cells) + " |"
+        )
     return "\n".join(lines) + "\n"
 
 

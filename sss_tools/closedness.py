@@ -181,9 +181,7 @@ def assess(mesh: Mesh) -> Assessment:
             state, manifold and oriented and not internal, all(_is_simple(topology, loop) for loop in loops)
         ),
     )
-    return Assessment(
-        closedness, components, inverted, parts.sign, loop_is_hole, interior, topology.component_of_face
-    )
+    return Assessment(closedness, components, inverted, parts.sign, loop_is_hole, interior, topology.component_of_face)
 
 
 def _handling(state: State, flawless: bool, simple_loops: bool) -> Handling:

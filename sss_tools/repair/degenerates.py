@@ -106,5 +106,3 @@ def _is_edge(faces, gone, a, b) -> bool:
 def _runs(face, a, b) -> bool:
     """Whether the face runs from a to b."""
     return any(face[k] == a and face[(k + 1) % 3] == b for k in range(3))
-
-

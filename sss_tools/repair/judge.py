@@ -169,7 +169,8 @@ def _visible_points(mesh: Mesh) -> NDArray[np.float64]:
     origin = inside[:, None] + 4 * RAY_OFFSET * side[..., None] * normal[:, None]
     rays = np.broadcast_to(direction, origin.shape)
     blocked = caster.occluded(
-        np.ascontiguousarray(origin.reshape(-1, 3).T, np.float32), np.ascontiguousarray(rays.reshape(-1, 3).T, np.float32)
+        np.ascontiguousarray(origin.reshape(-1, 3).T, np.float32),
+        np.ascontiguousarray(rays.reshape(-1, 3).T, np.float32),
     )
     return points[(~blocked.reshape(len(points), -1)).sum(axis=1) >= SEEN]
 
@@ -188,5 +189,3 @@ def _distinct(rows: NDArray[np.int64]) -> NDArray[np.int64]:
     fresh = np.ones(len(rows), bool)
     fresh[1:] = (ordered[1:] != ordered[:-1]).any(axis=1)
     return ordered[fresh]
-
-

@@ -67,9 +67,15 @@ STEPS = (
     Step("duplicates", remove_duplicates, leaves=("disagreeing_edges",), safe=True),
     Step("orientation", orient, safe=True),
     Step(
-        "caps", cap_holes, None, _has_open_edges, ("crossings", "non_manifold_edges", "pinches", "duplicates", "inverted")
+        "caps",
+        cap_holes,
+        None,
+        _has_open_edges,
+        ("crossings", "non_manifold_edges", "pinches", "duplicates", "inverted"),
     ),
-    Step("internal", remove_internal, None, lambda examined: examined.condition.internal + examined.condition.sheets > 0),
+    Step(
+        "internal", remove_internal, None, lambda examined: examined.condition.internal + examined.condition.sheets > 0
+    ),
     Step("unite", unite, unite_both_signs, _is_tangled, ("non_manifold_edges", "pinches")),
     Step("split", split_non_manifold, leaves=("inverted",)),
     Step("rebuild", rebuild, None, _is_no_solid),
@@ -238,7 +244,9 @@ def _lost(start: Draft, now: Draft) -> list[str]:
     lost = []
     stays = np.zeros(len(start.source.faces), bool)
     stays[now.birth] = True
-    names = {body.name: stays[body.first_face : body.first_face + body.face_count].any() for body in start.source.bodies}
+    names = {
+        body.name: stays[body.first_face : body.first_face + body.face_count].any() for body in start.source.bodies
+    }
     lost += [f"body {name}" for name, there in names.items() if not there]
     if start.source.vertex_attributes:
         corners = start.points[start.faces][now.birth]

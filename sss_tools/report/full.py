@@ -83,7 +83,9 @@ def _repair(repair: dict[str, Any]) -> list[str]:
         for name in ("faces", "area", "volume"):
             old, new = (_amount(values.get(name)) for values in (before, after))
             lines.append(f"          {name}: {old} -> {new}")
-        lines.append(f"          greatest distance from the old visible surface: {after['distance']:.2%} of the diagonal")
+        lines.append(
+            f"          greatest distance from the old visible surface: {after['distance']:.2%} of the diagonal"
+        )
         lines.append(f"          lost: {'; '.join(repair['lost']) or 'nothing'}")
     if repair["output"]:
         lines.append(f"          written to {repair['output']}; what follows is about that file")
