@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from dataclasses import replace
+from typing import TYPE_CHECKING, Literal
 
 from sss_tools.configuration import Configuration, Configurations, code_of, codes_of
 from sss_tools.errors import InputError
@@ -35,6 +36,7 @@ class TaskMaker:
         self._ignore = _codes(options.ignore, "--ignore")
         self._severities = _severities(options.severity)
         self._waive = _waivers(options)
+        self._fix = _fix(options)
         self._media: dict[tuple[str, str], Medium] = {}
         self.jobs: int | None = options.jobs
         self._scene = None if options.scene is None else self._read_scene(options.scene)
@@ -52,6 +54,18 @@ class TaskMaker:
         if self._scene is not None:
             self.outside_scene.append(path)
         return [self._task(path, None)]
+
+    def with_outputs(self, tasks: Sequence[Task]) -> list[Task]:
+        """The same tasks, each knowing where the repaired copy of its mesh goes."""
+        if not self._fix:
+            return list(tasks)
+        from sss_tools.repair.output import plan_outputs
+
+        meshes = list(dict.fromkeys(task.path for task in tasks))
+        places = plan_outputs(meshes, self._options.paths, self._options.fix_out)
+        return [
+            replace(task, settings=replace(task.settings, outputs={task.path: places[task.path]})) for task in tasks
+        ]
 
     def _read_scene(self, path: str) -> SceneMeshes:
         from .check_scene import SceneMeshes
@@ -82,6 +96,8 @@ class TaskMaker:
             unit=unit,
             surroundings=None if placed is None else placed.surroundings,
             record=options.record,
+            fix=self._fix,
+            diff=options.diff,
             waive=self._waive,
             cache=not options.no_cache,
         )
@@ -119,6 +135,16 @@ def _severities(texts: Sequence[str]) -> dict[str, Severity]:
             raise InputError(f"--severity {text}", "not CODE=LEVEL", "use for example SSS202=error")
         severities[rule_code(code)] = Severity(level.lower())
     return severities
+
+
+def _fix(options: argparse.Namespace) -> Literal["", "safe", "unsafe"]:
+    if options.unsafe_fixes:
+        return "unsafe"
+    if options.fix or options.diff:
+        return "safe"
+    if options.fix_out is not None:
+        raise InputError("--fix-out", "there is nothing to write without a fix", "add --fix or --unsafe-fixes")
+    return ""
 
 
 def _waivers(options: argparse.Namespace) -> dict[str, str]:

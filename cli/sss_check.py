@@ -11,7 +11,7 @@ from sss_tools.errors import InputError
 from sss_tools.validation.outcome import MeshReport
 
 from .check_report import FORMATS, refuse_to_overwrite, write_report
-from .command import ArgumentParser, complain, progress, run, unavailable
+from .command import ArgumentParser, complain, progress, run
 
 PROGRAM = "sss-check"
 
@@ -25,7 +25,6 @@ def _check(argv: Sequence[str] | None) -> int:
     start = time.perf_counter()
     parser = _parser()
     options = parser.parse_args(argv)
-    _refuse_what_comes_later(options)
     if options.explain is not None:
         sys.stdout.write(explain(options.explain))
         return 0
@@ -40,7 +39,7 @@ def _check(argv: Sequence[str] | None) -> int:
     paths = find_meshes(options.paths, sys.stdin if "-" in options.paths else ())
     if not paths:
         raise InputError("-", "the list on stdin names no mesh", "give one path a line")
-    tasks = [task for path in paths for task in maker.tasks(path)]
+    tasks = maker.with_outputs([task for path in paths for task in maker.tasks(path)])
     refuse_to_overwrite(options.output, [*paths, *(task.path for task in tasks)])
     if not options.quiet:
         for path in maker.outside_scene:
@@ -53,6 +52,8 @@ def _check(argv: Sequence[str] | None) -> int:
     for report in reports:
         _complain_of(report, options.quiet)
         status = max(status, report.exit_status)
+        if options.diff and report.repair and report.repair["after"]:
+            status = max(status, 1)
     write_report(options, reports, time.perf_counter() - start)
     return 0 if status == 1 and options.exit_zero else status
 
@@ -89,10 +90,12 @@ def _parser() -> ArgumentParser:
     add("--ignore", metavar="CODES", action="append", default=[], help="leave these out (SSS602, SSS70x always run)")
     add("--severity", metavar="CODE=LEVEL", action="append", default=[], help="error, warning or info instead")
     fix = parser.add_mutually_exclusive_group()
-    fix.add_argument("--fix", action="store_true", help="write a repaired copy (not available yet)")
-    fix.add_argument("--unsafe-fixes", action="store_true", help="the same, inventing surface (not available yet)")
-    add("--fix-out", metavar="DIR", help="where repaired copies go (not available yet)")
-    add("--diff", action="store_true", help="say what a fix would change (not available yet)")
+    fix.add_argument(
+        "--fix", action="store_true", help="write a repaired copy, STEM.fixed.EXT, of what can be repaired safely"
+    )
+    fix.add_argument("--unsafe-fixes", action="store_true", help="the same, and close holes, unite, split, rebuild")
+    add("--fix-out", metavar="DIR", help="where repaired copies go, the folders mirrored")
+    add("--diff", action="store_true", help="write nothing, say what a fix would change; exit 1 if anything")
     add("--record", action=argparse.BooleanOptionalAction, default=False, help="write MESH.sss.json beside it")
     add("--waive", metavar="CODES", action="append", default=[], help="accept these findings: with --record for as "
         "long as the geometry stays the same, else in this run")  # fmt: skip
@@ -107,13 +110,6 @@ def _parser() -> ArgumentParser:
     add("--isolated", action="store_true", help="read no configuration file")
     add("--exit-zero", action="store_true", help="findings do not change the exit status")
     return parser
-
-
-def _refuse_what_comes_later(options: argparse.Namespace) -> None:
-    """Nothing that was asked for is ignored in silence."""
-    for name in ("fix", "unsafe_fixes", "fix_out", "diff"):
-        if getattr(options, name):
-            raise unavailable("--" + name.replace("_", "-"))
 
 
 def explain(code: str) -> str:

@@ -120,6 +120,7 @@ class Assessment:
 
     components          one for each of the topology's components, in its order
     inverted            (c,) whether a component is a solid whose normals point inwards
+    sign                (c,) 1 where a component's normals point away from what it encloses, -1 where into it
     loop_is_hole        (l,) whether each of the topology's boundary loops bounds a hole
     interior            what lies inside solids
     component_of_face   (m,) as in the topology
@@ -129,6 +130,7 @@ class Assessment:
     closedness: Closedness
     components: tuple[Component, ...]
     inverted: NDArray[np.bool_]
+    sign: NDArray[np.float64]
     loop_is_hole: NDArray[np.bool_]
     interior: Interior
     component_of_face: NDArray[np.int64]
@@ -189,7 +191,7 @@ def assess(mesh: Mesh) -> Assessment:
         ),
     )
     return Assessment(
-        closedness, components, inverted, loop_is_hole, interior, topology.component_of_face, intersecting
+        closedness, components, inverted, parts.sign, loop_is_hole, interior, topology.component_of_face, intersecting
     )
 
 

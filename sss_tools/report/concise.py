@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from typing import Any
 
 from ..validation.outcome import MeshReport, Outcome, RuleReport
 
@@ -22,8 +23,9 @@ def render(reports: Sequence[MeshReport]) -> str:
 def lines(report: MeshReport) -> list[str]:
     """The lines of one mesh."""
     place = report.path if report.object is None else f"{report.path}:{report.object}"
-    found = [_finding(place, rule) for rule in report.shown]
-    if not found and report.error is not None:
+    found = [_repair(place, report.repair)] if report.repair is not None else []
+    found += [_finding(place, rule) for rule in report.shown]
+    if not report.shown and report.error is not None:
         return [f"{place}:not-run {report.error.removeprefix(f'{report.path}: ')}"]
     return found + [f"{place}:{rule.code} {Outcome.NOT_RUN} {rule.reason}" for rule in report.rules if rule.raised]
 
@@ -32,3 +34,9 @@ def _finding(place: str, rule: RuleReport) -> str:
     if rule.outcome == Outcome.WAIVED:
         return f"{place}:{rule.code} {Outcome.WAIVED} {rule.message} (waived: {rule.reason})"
     return f"{place}:{rule.code} {rule.severity} {rule.message}"
+
+
+def _repair(place: str, repair: dict[str, Any]) -> str:
+    """What became of the mesh, on one line."""
+    detail = repair["output"] or repair["reason"]
+    return f"{place}:repair {repair['status']}" + (f" {detail}" if detail else "")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
+from typing import Any
 
 from ..validation.outcome import FixSafety, MeshReport, Outcome, RuleReport, Severity
 
@@ -40,6 +41,8 @@ def section(report: MeshReport, verbose: bool = False) -> str:
     """One mesh."""
     name = report.path if report.object is None else f"{report.path} ({report.object})"
     lines = [f"{name}: {_headline(report)}"]
+    if report.repair is not None:
+        lines += _repair(report.repair)
     if report.closedness is not None:
         lines += _verdict(report)
     elif report.error is not None:
@@ -78,6 +81,30 @@ def _verdict(report: MeshReport) -> list[str]:
         f"  {_STATES[closedness['state']]} (components: {parts or 'none'})",
         f"  hole handling {_HANDLINGS[closedness['hole_handling']]}",
     ]
+
+
+def _repair(repair: dict[str, Any]) -> list[str]:
+    """What was done, what that changed, and what it cost."""
+    lines = [f"  repair {repair['status']}" + (f": {repair['reason']}" if repair["reason"] else "")]
+    for rung in repair["rungs"]:
+        if rung["status"] != "skipped" or rung["reason"] != "nothing to do":
+            lines.append(f"          {rung['name']} {rung['status']}: {rung['reason']}")
+    before, after = repair["before"], repair["after"]
+    if after:
+        for name in ("faces", "area", "volume"):
+            old, new = (_amount(values.get(name)) for values in (before, after))
+            lines.append(f"          {name}: {old} -> {new}")
+        lines.append(
+            f"          greatest distance from the old visible surface: {after['distance']:.2%} of the diagonal"
+        )
+        lines.append(f"          lost: {'; '.join(repair['lost']) or 'nothing'}")
+    if repair["output"]:
+        lines.append(f"          written to {repair['output']}; what follows is about that file")
+    return lines
+
+
+def _amount(value: float | None) -> str:
+    return "unknown" if value is None else f"{value:.6g}"
 
 
 def _finding(rule: RuleReport) -> list[str]:

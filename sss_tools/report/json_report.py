@@ -36,6 +36,8 @@ def mesh_object(report: MeshReport) -> dict[str, Any]:
     """One entry of ``meshes``."""
     data = asdict(report)
     data["rules"] = [rule_object(rule) for rule in report.rules]
+    if report.repair is None:
+        del data["repair"]  # there only when asked for
     # wall time comes last, as a reader expects it
     data["seconds"] = round(data.pop("seconds"), 3)
     return data

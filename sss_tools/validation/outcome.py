@@ -78,6 +78,8 @@ class MeshReport:
     hash        ``record.geometry_hash`` of what the file holds; None where that is not known
     object      the name of the scene's object that was looked at, where the mesh was checked as part of a scene
     closedness, components  as in CONTRACTS section 1; None and [] where they could not be found out
+    repair      what became of it, as in CONTRACTS section 1; None where nobody asked. All the rest is then about
+                the result, where one was written
     warnings    what went wrong beside the check (an unwritable record), one line each
     cached      the findings were known from an earlier check of the same geometry
     seconds     wall time
@@ -96,6 +98,7 @@ class MeshReport:
     closedness: dict[str, Any] | None = None
     components: list[dict[str, Any]] = field(default_factory=list)
     rules: list[RuleReport] = field(default_factory=list)
+    repair: dict[str, Any] | None = None
     warnings: list[str] = field(default_factory=list)
     cached: bool = False
     seconds: float = 0.0

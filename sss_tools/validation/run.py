@@ -47,13 +47,20 @@ def check_file(path: str | Path, settings: Settings | None = None) -> MeshReport
         return report
     context, problems = _context(mesh, settings)
     report = _known_or_checked(mesh, context, settings, path)
+    repairs: list[dict[str, Any]] = []
+    if settings.fix and report.error is None:
+        report, result = _repaired(path, mesh, context, report, settings)
+        if result is not None and report.repair is not None and report.repair["output"] is not None:
+            # waivers and record are those of the result: it is other geometry
+            path, mesh, report.hash = report.repair["output"], result, geometry_hash(result)
+            repairs = [rung for rung in report.repair["rungs"] if rung["status"] == "applied"]
     report.warnings += problems
     if settings.surroundings is not None:
         report.object = settings.surroundings.placed.name
     waivers = waive(report, path, settings)
     if settings.record and report.closedness is not None:
         try:
-            write_record(path, mesh, report, settings.material, context.medium, settings.unit, waivers=waivers)
+            write_record(path, mesh, report, settings.material, context.medium, settings.unit, waivers, repairs)
         except OSError as error:
             report.warnings.append(f"{path}: the record could not be written ({error.strerror or error})")
     report.seconds = time.perf_counter() - start
@@ -121,6 +128,26 @@ def check_mesh(
             _describe(subject, report)
     report.seconds = time.perf_counter() - start
     return report
+
+
+def _repaired(
+    path: str | Path, mesh: Mesh, context: Context, report: MeshReport, settings: Settings
+) -> tuple[MeshReport, Mesh | None]:
+    """The report on the repaired mesh, and that mesh; the one at hand and None where there is no result."""
+    from ..repair.file import repair_file
+
+    place = settings.outputs.get(str(path), str(Path(path).with_suffix(".fixed")))
+    result, repair, failure = repair_file(mesh, place, settings.fix == "unsafe", settings.diff)
+    repair.before["findings"] = {finding.code: finding.count for finding in report.findings}
+    if result is not None:
+        checked = check_mesh(result, context, settings, path)
+        repair.after["findings"] = {finding.code: finding.count for finding in checked.findings}
+        if not settings.diff:
+            report = checked
+    report.repair = repair.to_json()
+    if failure is not None:
+        report.warnings.append(f"{failure.line()}")
+    return report, None if settings.diff else result
 
 
 def report_not_checked(path: str | Path, reason: str, settings: Settings, raised: bool = False) -> MeshReport:

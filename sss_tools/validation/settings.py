@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 from .outcome import Severity
 
@@ -27,6 +27,9 @@ class Settings:
     record          whether to write MESH.sss.json beside each mesh
     waive           code -> reason: findings that the user accepts, beside those waived in the record
     cache           whether to look for the findings among, and keep them with, those of earlier runs
+    fix             "safe" or "unsafe": repair each mesh and check the result; "" leaves meshes alone
+    diff            repair, but write nothing
+    outputs         path of a mesh -> where its repaired copy goes, without extension (``repair.plan_outputs``)
     """
 
     select: tuple[str, ...] = ()
@@ -39,6 +42,9 @@ class Settings:
     record: bool = False
     waive: Mapping[str, str] = field(default_factory=dict)
     cache: bool = False
+    fix: Literal["", "safe", "unsafe"] = ""
+    diff: bool = False
+    outputs: Mapping[str, str] = field(default_factory=dict)
 
     def wants(self, code: str) -> bool:
         """Whether a rule is to run: selected, and not ignored by as long a prefix or a longer one."""

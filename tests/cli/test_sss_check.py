@@ -132,23 +132,6 @@ def test_a_folder_is_searched_and_a_list_is_read_from_stdin(in_folder, capsys, m
 @pytest.mark.parametrize(
     "arguments",
     [
-        ["--fix"],
-        ["--unsafe-fixes"],
-        ["--diff"],
-        ["--fix-out", "out"],
-    ],
-)
-def test_what_comes_later_is_refused_and_not_ignored(in_folder, capsys, arguments):
-    path = write("box.ply", shapes.box())
-    assert main([path, *arguments]) == 2
-    captured = capsys.readouterr()
-    assert "not available in this version" in captured.err and captured.err.count("\n") == 1
-    assert captured.out == "" and listing() == ["box.ply"]
-
-
-@pytest.mark.parametrize(
-    "arguments",
-    [
         [],
         ["box.ply", "--format", "xml"],
         ["box.ply", "--unit", "furlong"],
