@@ -113,7 +113,8 @@ def page(rows: list[tuple[str, dict]]) -> str:
         "Balls of 1280 faces, a quarter each sound, holed, hollow and inverted; one file in fifty is cut short.",
         f"Each run once, {os.cpu_count()} processors ({platform.machine()}), Python {platform.python_version()}: "
         "`python benchmarks/batch.py`. *memory* is the peak of the command itself, without its workers.",
-        f"Load average at the end: {os.getloadavg()[1]:.1f}; above the number of processors, jobs share them with others.",
+        f"Load average at the end: {os.getloadavg()[1]:.1f}; above the number of processors, jobs share them with "
+        "others.",
         "",
         "| run | meshes | unreadable | from cache | seconds | ms a mesh | memory, MB | report, MB |",
         "|---|---:|---:|---:|---:|---:|---:|---:|",
