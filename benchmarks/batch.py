@@ -27,10 +27,15 @@ ROOT = Path(__file__).parents[1]
 
 COMMAND = """
 import resource, sys
+from pathlib import Path
 from cli.sss_check import main
 status = main(sys.argv[1:])
-unit = 1 if sys.platform == "darwin" else 1024
-print(status, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * unit)
+peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * (1 if sys.platform == "darwin" else 1024)
+if Path("/proc/self/status").exists():
+    # on Linux ru_maxrss begins with what the process was before it became this program
+    lines = Path("/proc/self/status").read_text().splitlines()
+    peak = next(int(line.split()[1]) * 1024 for line in lines if line.startswith("VmHWM"))
+print(status, peak)
 """
 
 
@@ -108,6 +113,8 @@ def page(rows: list[tuple[str, dict]]) -> str:
         "Balls of 1280 faces, a quarter each sound, holed, hollow and inverted; one file in fifty is cut short.",
         f"Each run once, {os.cpu_count()} processors ({platform.machine()}), Python {platform.python_version()}: "
         "`python benchmarks/batch.py`. *memory* is the peak of the command itself, without its workers.",
+        f"Load average at the end: {os.getloadavg()[1]:.1f}; above the number of processors, jobs share them with "
+        "others.",
         "",
         "| run | meshes | unreadable | from cache | seconds | ms a mesh | memory, MB | report, MB |",
         "|---|---:|---:|---:|---:|---:|---:|---:|",
