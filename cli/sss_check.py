@@ -7,7 +7,7 @@ import sys
 import time
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 from sss_tools.errors import InputError
 from sss_tools.validation.outcome import MeshReport, Severity
@@ -94,9 +94,7 @@ def _parser() -> ArgumentParser:
     add("--ignore", metavar="CODES", action="append", default=[], help="leave these out (SSS602, SSS70x always run)")
     add("--severity", metavar="CODE=LEVEL", action="append", default=[], help="error, warning or info instead")
     fix = parser.add_mutually_exclusive_group()
-    fix.add_argument(
-        "--fix", action="store_true", help="write a repaired copy, STEM.fixed.EXT, of what can be repaired safely"
-    )
+    fix.add_argument("--fix", action="store_true", help="write STEM.fixed.EXT, repaired without changing the shape")
     fix.add_argument("--unsafe-fixes", action="store_true", help="the same, and close holes, unite, split, rebuild")
     add("--fix-out", metavar="DIR", help="where repaired copies go, the folders mirrored")
     add("--diff", action="store_true", help="write nothing, say what a fix would change; exit 1 if anything")
@@ -131,7 +129,9 @@ def _settings(options: argparse.Namespace) -> Settings:
 
         if options.material not in PRESETS:
             raise InputError(f"--material {options.material}", "no such preset", f"use {', '.join(PRESETS)}")
-    fix = "unsafe" if options.unsafe_fixes else "safe" if options.fix or options.diff else ""
+    fix: Literal["", "safe", "unsafe"] = (
+        "unsafe" if options.unsafe_fixes else "safe" if options.fix or options.diff else ""
+    )
     if options.fix_out is not None and not fix:
         raise InputError("--fix-out", "there is nothing to write without a fix", "add --fix or --unsafe-fixes")
     return Settings(

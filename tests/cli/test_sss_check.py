@@ -126,10 +126,6 @@ def test_a_folder_is_searched_and_a_list_is_read_from_stdin(in_folder, capsys, m
 @pytest.mark.parametrize(
     "arguments",
     [
-        ["--fix"],
-        ["--unsafe-fixes"],
-        ["--diff"],
-        ["--fix-out", "out"],
         ["--scheduler", "tcp://here:1"],
         ["--scene", "scene.toml"],
         ["--format", "sarif"],
