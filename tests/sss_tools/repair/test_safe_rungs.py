@@ -167,9 +167,7 @@ class TestTheLadder:
         def vandal(draft):
             return Draft(draft.source, draft.mesh.vertices, draft.topology.faces[1:], draft.birth[1:], "dropped")
 
-        steps = tuple(
-            ladder.Step("weld", vandal, safe=True) if step.name == "weld" else step for step in ladder.STEPS
-        )
+        steps = tuple(ladder.Step("weld", vandal, safe=True) if step.name == "weld" else step for step in ladder.STEPS)
         monkeypatch.setattr(ladder, "STEPS", steps)
         result, report = repair_mesh(shapes.inverted(shapes.box()))
         assert {rung.name: rung.status for rung in report.rungs}["weld"] == "undone"

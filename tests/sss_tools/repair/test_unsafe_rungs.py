@@ -40,7 +40,8 @@ class TestCaps:
         result, report = repair_mesh(bowl, unsafe=True)
         assert statuses(report)["caps"] == "applied"
         assert report.status == "fixed"
-        assert report.after["distance"] == 0
+        # the old faces are all there: rounding of the nearest point is all there is
+        assert report.after["distance"] < 1e-14
         assert condition(result).is_solid
 
     def test_a_large_curved_hole_gets_a_smooth_cap(self):
