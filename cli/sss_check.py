@@ -90,9 +90,7 @@ def _parser() -> ArgumentParser:
     add("--ignore", metavar="CODES", action="append", default=[], help="leave these out (SSS602, SSS70x always run)")
     add("--severity", metavar="CODE=LEVEL", action="append", default=[], help="error, warning or info instead")
     fix = parser.add_mutually_exclusive_group()
-    fix.add_argument(
-        "--fix", action="store_true", help="write a repaired copy, STEM.fixed.EXT, of what can be repaired safely"
-    )
+    fix.add_argument("--fix", action="store_true", help="write STEM.fixed.EXT, repaired without changing the shape")
     fix.add_argument("--unsafe-fixes", action="store_true", help="the same, and close holes, unite, split, rebuild")
     add("--fix-out", metavar="DIR", help="where repaired copies go, the folders mirrored")
     add("--diff", action="store_true", help="write nothing, say what a fix would change; exit 1 if anything")

@@ -66,22 +66,8 @@ def _settle_cancelling_pairs(topology, live, group, even, first, keep) -> int:
         elif closed_without >= open_without:
             cancelled += int(np.isin(group, pairs[chosen]).sum())
         else:
-            _keep_the_fitting(topology, first[:, pairs[chosen]], others, keep)
+            keep[first[0, pairs[chosen]]] = True  # which way it faces is for the next rung to say
     return cancelled
-
-
-def _keep_the_fitting(topology, candidates: NDArray[np.int64], others, keep) -> None:
-    """Of each pair (2, p) the face that agrees with most neighbours along the patch's rim; for all pairs alike."""
-    score = []
-    for faces in candidates:
-        edges = topology.face_edges[faces].ravel()
-        rim = others[edges] == 1
-        outside = np.isin(topology.face_edges, edges[rim]) & keep[:, None]
-        forward = np.zeros(len(topology.edges), np.int64)
-        np.add.at(forward, topology.face_edges[outside], np.where(topology.side_direction[outside], 1, -1))
-        own = np.where(topology.side_direction[faces].ravel()[rim], 1, -1)
-        score.append(int((forward[edges[rim]] * own < 0).sum()))
-    keep[candidates[int(np.argmax(score))]] = True
 
 
 def _is_even(faces: NDArray[np.int64]) -> NDArray[np.bool_]:

@@ -37,12 +37,12 @@ def _split(points, triangles, topology, long):
     """Every edge of ``long`` split that shares no face with one before it."""
     faces_of = _two_faces(topology)
     used = np.zeros(len(triangles), bool)
-    chosen = []
+    picked = []
     for edge in long:
         if not used[faces_of[edge]].any():
             used[faces_of[edge]] = True
-            chosen.append(edge)
-    chosen = np.array(chosen)
+            picked.append(edge)
+    chosen = np.array(picked)
     middle = len(points) + np.arange(len(chosen))
     points = np.concatenate([points, points[topology.edges[chosen]].mean(axis=1)])
     new = [triangles[~used]]

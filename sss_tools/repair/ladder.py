@@ -57,25 +57,24 @@ def _is_tangled(examined: Examined) -> bool:
     return (condition.crossings or 0) + condition.non_manifold_edges + condition.internal > 0
 
 
+def _holds_something(examined: Examined) -> bool:
+    return examined.condition.internal + examined.condition.sheets > 0
+
+
 def _is_no_solid(examined: Examined) -> bool:
     return not examined.condition.is_solid
 
+
+TANGLES = ("crossings", "non_manifold_edges", "pinches")
+"""What ``unite`` and ``split`` see to."""
 
 STEPS = (
     Step("weld", weld, leaves=("duplicates", "non_manifold_edges", "pinches", "disagreeing_edges"), safe=True),
     Step("degenerates", remove_degenerates, leaves=("duplicates",), safe=True),
     Step("duplicates", remove_duplicates, leaves=("disagreeing_edges",), safe=True),
     Step("orientation", orient, safe=True),
-    Step(
-        "caps",
-        cap_holes,
-        None,
-        _has_open_edges,
-        ("crossings", "non_manifold_edges", "pinches", "duplicates", "inverted"),
-    ),
-    Step(
-        "internal", remove_internal, None, lambda examined: examined.condition.internal + examined.condition.sheets > 0
-    ),
+    Step("caps", cap_holes, None, _has_open_edges, (*TANGLES, "duplicates", "inverted")),
+    Step("internal", remove_internal, None, _holds_something),
     Step("unite", unite, unite_both_signs, _is_tangled, ("non_manifold_edges", "pinches")),
     Step("split", split_non_manifold, leaves=("inverted",)),
     Step("rebuild", rebuild, None, _is_no_solid),
@@ -244,15 +243,14 @@ def _lost(start: Draft, now: Draft) -> list[str]:
     lost = []
     stays = np.zeros(len(start.source.faces), bool)
     stays[now.birth] = True
-    names = {
-        body.name: stays[body.first_face : body.first_face + body.face_count].any() for body in start.source.bodies
-    }
-    lost += [f"body {name}" for name, there in names.items() if not there]
+    for body in start.source.bodies:
+        if not stays[body.first_face : body.first_face + body.face_count].any():
+            lost.append(f"body {body.name}")
     if start.source.vertex_attributes:
         corners = start.points[start.faces][now.birth]
         # a corner that is none of its birth face's has attributes that were interpolated
         known = (now.points[now.faces][:, :, None] == corners[:, None]).all(-1).any(-1).all(-1)
         if not known.all():
-            names = ", ".join(start.source.vertex_attributes)
-            lost.append(f"{names} interpolated on {int((~known).sum())} of {len(known)} faces")
+            attributes = ", ".join(start.source.vertex_attributes)
+            lost.append(f"{attributes} interpolated on {int((~known).sum())} of {len(known)} faces")
     return lost

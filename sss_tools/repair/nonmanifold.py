@@ -157,7 +157,8 @@ def _wedges(topology, sides) -> NDArray[np.int64]:
     forward = topology.side_direction.ravel()[sides]
     # of faces at one angle those that end matter come first
     order = np.lexsort((~forward, np.round(angle, 12)))
-    pairs, waiting = [], []
+    pairs: list[tuple[int, int]] = []
+    waiting: list[int] = []
     for place in np.concatenate([order, order]):
         side = sides[place]
         if not forward[place]:

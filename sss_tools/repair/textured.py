@@ -52,16 +52,16 @@ def glb_bytes(mesh: Mesh, source: Mesh, mark: Callable[[bytes], dict[str, Any]])
     import trimesh
 
     assert source.path is not None
-    materials = {}
+    materials: dict[str, Any] = {}
     for geometry in trimesh.load_scene(str(source.path), process=False).geometry.values():
         material = getattr(getattr(geometry, "visual", None), "material", None)
         if getattr(material, "name", None):
-            materials[str(material.name)] = material
+            materials[str(getattr(material, "name", ""))] = material
     scene = trimesh.Scene()
     for number, body in enumerate(mesh.bodies):
         faces = mesh.faces[body.first_face : body.first_face + body.face_count]
         used, compact = np.unique(faces, return_inverse=True)
-        part = trimesh.Trimesh(mesh.vertices[used], compact.reshape(-1, 3), process=False)
+        part: Any = trimesh.Trimesh(mesh.vertices[used], compact.reshape(-1, 3), process=False)
         uv = mesh.vertex_attributes.get("uv")
         if body.material in materials:
             part.visual = trimesh.visual.TextureVisuals(

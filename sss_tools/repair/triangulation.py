@@ -33,7 +33,7 @@ def triangulate_loop(points, taken) -> tuple[NDArray[np.int64], bool] | None:
     if count == 3:
         return np.array([[0, 1, 2]]), flat
     if flat and count > 8:
-        triangles = _cut_flat(points, normal, size / 2)
+        triangles = _cut_flat(points, normal, float(size) / 2)
         if triangles is not None and not _joins(triangles, taken):
             return triangles, True
     ears, rest = _clip_ears(points, taken, count - LONGEST)
