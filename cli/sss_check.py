@@ -6,21 +6,14 @@ import argparse
 import sys
 import time
 from collections.abc import Sequence
-from pathlib import Path
-from typing import TYPE_CHECKING
 
 from sss_tools.errors import InputError
-from sss_tools.validation.outcome import MeshReport, Severity
-from sss_tools.validation.settings import Settings
+from sss_tools.validation.outcome import MeshReport
 
-from .command import ArgumentParser, complain, progress, run, unavailable, version
-
-if TYPE_CHECKING:
-    from sss_tools.validation.rule import Rule
+from .check_report import FORMATS, refuse_to_overwrite, write_report
+from .command import ArgumentParser, complain, progress, run
 
 PROGRAM = "sss-check"
-FORMATS = ("full", "concise", "json", "sarif", "github")
-LATER_FORMATS = ("sarif", "github")
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -32,40 +25,49 @@ def _check(argv: Sequence[str] | None) -> int:
     start = time.perf_counter()
     parser = _parser()
     options = parser.parse_args(argv)
-    _refuse_what_comes_later(options)
     if options.explain is not None:
         sys.stdout.write(explain(options.explain))
         return 0
     if not options.paths:
         parser.error("no mesh given: name a file, a folder, or - for a list on stdin")
-    settings = _settings(options)
 
-    from sss_tools.batch import check_files, find_meshes
+    from sss_tools.batch import check_tasks, find_meshes
 
+    from .check_tasks import TaskMaker
+
+    maker = TaskMaker(options)
     paths = find_meshes(options.paths, sys.stdin if "-" in options.paths else ())
-    for path in paths:
-        if path.lower().endswith(".toml"):
-            raise unavailable(path, "name the meshes of the scene instead; checking scenes comes later")
-    if options.output not in (None, "-", "/dev/stdout"):
-        _refuse_to_overwrite(options.output, paths)
     if not paths:
         raise InputError("-", "the list on stdin names no mesh", "give one path a line")
-    with progress(len(paths), "checking", options.quiet) as advance:
-        reports = check_files(
-            paths, settings, options.jobs, options.timeout, done=lambda report: advance(1, report.path)
+    tasks = maker.with_outputs([task for path in paths for task in maker.tasks(path)])
+    refuse_to_overwrite(options.output, [*paths, *(task.path for task in tasks)])
+    if not options.quiet:
+        for path in maker.outside_scene:
+            complain(PROGRAM, f"{path}: is not in {options.scene}; it is checked by itself", "warning")
+    with progress(len(tasks), "checking", options.quiet) as advance:
+        reports = check_tasks(
+            tasks, maker.jobs, done=lambda report: advance(1, report.path), scheduler=options.scheduler
         )
+    status = 0
     for report in reports:
-        if report.error is not None:
-            complain(PROGRAM, report.error, "error" if report.exit_status == 2 else "warning")
-        for rule in report.rules:
-            if rule.raised and report.status == "ok":
-                complain(PROGRAM, f"{report.path}: {rule.code}: {rule.reason}; please report this")
-        if not options.quiet:
-            for warning in report.warnings:
-                complain(PROGRAM, warning, "warning")
-    _write(_render(options, reports, time.perf_counter() - start), options.output)
-    status = max((report.exit_status for report in reports), default=0)
+        _complain_of(report, options.quiet)
+        status = max(status, report.exit_status)
+        if options.diff and report.repair and report.repair["after"]:
+            status = max(status, 1)
+    write_report(options, reports, time.perf_counter() - start)
     return 0 if status == 1 and options.exit_zero else status
+
+
+def _complain_of(report: MeshReport, quiet: bool) -> None:
+    """What went wrong with a file, on stderr."""
+    if report.error is not None:
+        complain(PROGRAM, report.error, "error" if report.exit_status == 2 else "warning")
+    for rule in report.rules:
+        if rule.raised and report.status == "ok":
+            complain(PROGRAM, f"{report.path}: {rule.code}: {rule.reason}; please report this")
+    if not quiet:
+        for warning in report.warnings:
+            complain(PROGRAM, warning, "warning")
 
 
 def _parser() -> ArgumentParser:
@@ -73,90 +75,48 @@ def _parser() -> ArgumentParser:
         PROGRAM,
         description="Check meshes before subsurface scattering: are they closed, oriented, free of inner walls?",
         epilog="Exit status: 0 no finding at error level, 1 at least one, 2 a file that could not be used or a bad "
-        "option. A check that crashes or takes too long is not-run and changes no status.",
+        "option. A check that crashes or takes too long is not-run and changes no status. Configuration: sss.toml, or "
+        "[tool.sss-check] in pyproject.toml, the nearest upwards from each mesh, else from the working directory.",
     )
     add = parser.add_argument
-    add("paths", nargs="*", metavar="PATH", help="a mesh file, a folder (recursively), or - for a list on stdin")
-    add("--material", metavar="NAME", help="preset the meshes are made of, for rules about scale")
-    add("--scene", metavar="SCENE.toml", help="take materials and neighbours from a scene (not available yet)")
-    add("--format", choices=FORMATS, default="full", help="how to report (sarif and github: not available yet)")
+    add("paths", nargs="*", metavar="PATH", help="a mesh file, a folder (recursively), a scene (all its objects), "
+        "or - for a list on stdin")  # fmt: skip
+    add("--material", metavar="NAME|FILE", help="what the meshes are made of: a preset, or a TOML file")
+    add("--scene", metavar="SCENE.toml", help="give the meshes the materials, scale and neighbours they have there")
+    add("--format", choices=FORMATS, default="full", help="how to report (default: full)")
     add("-o", "--output", metavar="FILE", help="write the report there instead of to stdout")
     add("--unit", choices=("mm", "cm", "m", "inch"), help="what one mesh unit is")
     add("--select", metavar="CODES", action="append", default=[], help="run these rules: codes or prefixes, a,b,c")
     add("--ignore", metavar="CODES", action="append", default=[], help="leave these out (SSS602, SSS70x always run)")
     add("--severity", metavar="CODE=LEVEL", action="append", default=[], help="error, warning or info instead")
     fix = parser.add_mutually_exclusive_group()
-    fix.add_argument("--fix", action="store_true", help="write a repaired copy (not available yet)")
-    fix.add_argument("--unsafe-fixes", action="store_true", help="the same, inventing surface (not available yet)")
-    add("--fix-out", metavar="DIR", help="where repaired copies go (not available yet)")
-    add("--diff", action="store_true", help="say what a fix would change (not available yet)")
+    fix.add_argument("--fix", action="store_true", help="write STEM.fixed.EXT, repaired without changing the shape")
+    fix.add_argument("--unsafe-fixes", action="store_true", help="the same, and close holes, unite, split, rebuild")
+    add("--fix-out", metavar="DIR", help="where repaired copies go, the folders mirrored")
+    add("--diff", action="store_true", help="write nothing, say what a fix would change; exit 1 if anything")
     add("--record", action=argparse.BooleanOptionalAction, default=False, help="write MESH.sss.json beside it")
+    add("--waive", metavar="CODES", action="append", default=[], help="accept these findings: with --record for as "
+        "long as the geometry stays the same, else in this run")  # fmt: skip
+    add("--reason", metavar="TEXT", help="why they are accepted; kept and shown with them")
     add("--explain", metavar="CODE", help="say what a rule finds and why that matters, and exit")
     add("--statistics", action="store_true", help="add how often each rule found something")
     add("--jobs", type=_positive_int, metavar="N", help="meshes checked at a time (default: one a processor)")
-    add("--scheduler", metavar="ADDRESS", help="check on a cluster (not available yet)")
-    add("--timeout", type=_positive, default=300.0, metavar="S", help="seconds a mesh may take (default 300)")
+    add("--scheduler", metavar="ADDRESS", help="check on the Dask cluster with this scheduler")
+    add("--timeout", type=_positive, metavar="S", help="seconds a mesh may take (default 300)")
+    add("--max-memory", type=_size, metavar="SIZE", help="memory a mesh may take: 500M, 2G (default: no limit)")
+    add("--no-cache", action="store_true", help="check again what was checked before")
+    add("--isolated", action="store_true", help="read no configuration file")
     add("--exit-zero", action="store_true", help="findings do not change the exit status")
     return parser
 
 
-def _refuse_what_comes_later(options: argparse.Namespace) -> None:
-    """Nothing that was asked for is ignored in silence."""
-    for name in ("scene", "fix", "unsafe_fixes", "fix_out", "diff", "scheduler"):
-        if getattr(options, name):
-            raise unavailable("--" + name.replace("_", "-"))
-    if options.format in LATER_FORMATS:
-        raise unavailable(f"--format {options.format}", "use full, concise or json")
-
-
-def _settings(options: argparse.Namespace) -> Settings:
-    severities = {}
-    for text in options.severity:
-        code, _, level = text.partition("=")
-        if level.lower() not in list(Severity):
-            raise InputError(f"--severity {text}", "not CODE=LEVEL", "use for example SSS202=error")
-        severities[_rule(code).code] = Severity(level.lower())
-    if options.material is not None:
-        from sss_tools.medium import PRESETS
-
-        if options.material not in PRESETS:
-            raise InputError(f"--material {options.material}", "no such preset", f"use {', '.join(PRESETS)}")
-    return Settings(
-        select=_codes(options.select, "--select"),
-        ignore=_codes(options.ignore, "--ignore"),
-        severities=severities,
-        material=options.material,
-        unit=options.unit,
-        record=options.record,
-    )
-
-
-def _codes(texts: list[str], option: str) -> tuple[str, ...]:
-    """Codes and prefixes of codes from comma-separated lists; each must mean at least one rule."""
-    prefixes = tuple(part.strip().upper() for text in texts for part in text.split(",") if part.strip())
-    if texts and not prefixes:
-        raise InputError(option, "no code given", "use for example SSS1 or SSS101,SSS203")
-    if prefixes:
-        from sss_tools.validation.rule import all_rules
-
-        for prefix in prefixes:
-            if not any(rule.code.startswith(prefix) for rule in all_rules()):
-                raise InputError(f"{option} {prefix}", "no rule has such a code", "use for example SSS1 or SSS101")
-    return prefixes
-
-
-def _rule(code: str) -> Rule:
-    from sss_tools.validation.rule import all_rules
-
-    for rule in all_rules():
-        if code.upper() == rule.code or code.lower() == rule.name:
-            return rule
-    raise InputError(code, "no such rule", f"use one of {', '.join(rule.code for rule in all_rules())}")
-
-
 def explain(code: str) -> str:
     """What a rule finds, what that does to the light, and what helps. Raises InputError for an unknown code."""
-    rule = _rule(code)
+    from sss_tools.validation.rule import all_rules
+
+    from .check_tasks import rule_code
+
+    (rule,) = (rule for rule in all_rules() if rule.code == rule_code(code))
     return (
         f"{rule.code} {rule.name} ({rule.severity})\n\n"
         f"Finds: {rule.finds}\n"
@@ -165,50 +125,20 @@ def explain(code: str) -> str:
     )
 
 
-def _refuse_to_overwrite(output: str, paths: list[str]) -> None:
-    target = Path(output)
-    if any(target.resolve() == Path(path).resolve() for path in paths):
-        raise InputError(output, "is one of the meshes", "write the report to another file")
-    if target.is_dir() or not target.parent.is_dir():
-        problem = "is a folder" if target.is_dir() else "its folder does not exist"
-        raise InputError(output, f"cannot be written: {problem}", "name a file in an existing folder")
-
-
-def _render(options: argparse.Namespace, reports: list[MeshReport], seconds: float) -> str:
-    from sss_tools.report import concise, full, json_report, statistics_table
-
-    if options.format == "json":
-        return json_report.render(reports, version(), seconds)
-    if options.format == "concise":
-        text = concise.render(reports)
-    else:
-        text = full.render(reports, options.verbose)
-        if not options.quiet and len(reports) > 1:
-            bad = sum(report.exit_status > 0 for report in reports)
-            text += f"\n{len(reports)} meshes, {bad} with errors, {seconds:.1f} s\n"
-    return text + ("\n" + statistics_table.render(reports) if options.statistics else "")
-
-
-def _write(text: str, output: str | None) -> None:
-    # opening /dev/stdout anew would write over what follows where stdout is a file
-    if output in (None, "-", "/dev/stdout"):
-        sys.stdout.write(text)
-        return
-    from sss_tools.files import write_atomically
-
-    try:
-        write_atomically(output, text.encode(errors="backslashreplace"))
-    except OSError as error:
-        raise InputError(
-            output, f"cannot be written ({error.strerror})", "name a file in a folder you may write to"
-        ) from error
-
-
 def _positive(text: str) -> float:
     value = float(text)
     if not 0 < value < float("inf"):
         raise argparse.ArgumentTypeError(f"must be greater than 0, not {text}")
     return value
+
+
+def _size(text: str) -> int:
+    from sss_tools.configuration import size_of
+
+    try:
+        return size_of(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"must be a size like 500M or 2G, not {text}") from None
 
 
 def _positive_int(text: str) -> int:

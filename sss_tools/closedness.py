@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .interior import Interior, Shell, find_interior, winding_in_shells
+from .intersection import self_intersections
 from .mesh import Mesh
 from .patches import orient_consistently, patch_of_face
 from .topology import Topology
@@ -30,6 +31,11 @@ ENCLOSES = 0.75
 FLAT = 1e-3
 """A closed component whose volume is below this share of area times diagonal is looked at for what it encloses:
 two sheets back to back are closed, too."""
+
+
+FOLD = 0.02
+"""Share of a component's area that may lie in folds where it passes through itself and still is no internal
+geometry: such a fold is a self-intersection and nothing more."""
 
 
 @dataclass(frozen=True)
@@ -76,7 +82,7 @@ class Closedness:
     manifold            no edge has more than two faces, and no point joins several fans
     oriented            neighbours agree, and the normals of solids point outwards
     internal_geometry   surface found inside a solid that bounds no cavity
-    self_intersecting   None where nobody looked
+    self_intersecting   faces pass through each other or touch; None where nobody looked
     boundary_loops      connected components of the graph of boundary edges, in the whole file
     holes               the loops of components that enclose volume
     hole_area_fraction  area of the holes over the mesh's area
@@ -114,17 +120,21 @@ class Assessment:
 
     components          one for each of the topology's components, in its order
     inverted            (c,) whether a component is a solid whose normals point inwards
+    sign                (c,) 1 where a component's normals point away from what it encloses, -1 where into it
     loop_is_hole        (l,) whether each of the topology's boundary loops bounds a hole
     interior            what lies inside solids
     component_of_face   (m,) as in the topology
+    self_intersections  (p, 2) pairs of faces that meet elsewhere than in a common side or corner
     """
 
     closedness: Closedness
     components: tuple[Component, ...]
     inverted: NDArray[np.bool_]
+    sign: NDArray[np.float64]
     loop_is_hole: NDArray[np.bool_]
     interior: Interior
     component_of_face: NDArray[np.int64]
+    self_intersections: NDArray[np.int64]
 
     @property
     def volume(self) -> float | None:
@@ -148,13 +158,14 @@ def assess(mesh: Mesh) -> Assessment:
     if not np.isfinite(mesh.vertices[mesh.faces]).all():
         raise ValueError("closedness needs finite coordinates")
     topology = mesh.topology
+    intersecting = self_intersections(topology)
     parts = _Parts(topology)
     roles, inverted = _roles(parts)
     components = tuple(
         Component(len(faces), role, bool(closed), float(volume) if closed else None)
         for faces, role, closed, volume in zip(parts.groups, roles, parts.closed, parts.volumes, strict=True)
     )
-    interior = _interior(parts)
+    interior = _interior(parts, intersecting)
     loop_is_hole = np.array(
         [parts.encloses[parts.component_of_edge[loop[0]]] for loop in topology.boundary_loops], bool
     )
@@ -171,7 +182,7 @@ def assess(mesh: Mesh) -> Assessment:
         manifold=manifold,
         oriented=oriented,
         internal_geometry=internal,
-        self_intersecting=None,
+        self_intersecting=len(intersecting) > 0,
         boundary_loops=len(topology.boundary_loops),
         holes=holes,
         hole_area_fraction=sum(hole.area for hole in holes) / mesh.area if holes else 0.0,
@@ -179,7 +190,9 @@ def assess(mesh: Mesh) -> Assessment:
             state, manifold and oriented and not internal, all(_is_simple(topology, loop) for loop in loops)
         ),
     )
-    return Assessment(closedness, components, inverted, loop_is_hole, interior, topology.component_of_face)
+    return Assessment(
+        closedness, components, inverted, parts.sign, loop_is_hole, interior, topology.component_of_face, intersecting
+    )
 
 
 def _handling(state: State, flawless: bool, simple_loops: bool) -> Handling:
@@ -276,17 +289,34 @@ def _roles(parts: _Parts) -> tuple[list[Role], NDArray[np.bool_]]:
     return roles, inverted
 
 
-def _interior(parts: _Parts) -> Interior:
-    """What lies inside solids; nothing can where a single closed manifold component is all there is."""
-    if parts.count < 2 and len(parts.topology.nonmanifold_edges) == 0:
+def _interior(parts: _Parts, intersecting: NDArray[np.int64]) -> Interior:
+    """What lies inside solids; nothing can where a single manifold component that meets itself nowhere is all.
+
+    intersecting  (p, 2) pairs of faces that meet others
+    """
+    cut = np.unique(intersecting)
+    if parts.count < 2 and len(parts.topology.nonmanifold_edges) == 0 and len(cut) == 0:
         return Interior()
-    return find_interior(
-        parts.points,
-        parts.faces,
-        patch_of_face(parts.topology),
-        parts.shells,
-        parts.topology.component_of_face,
+    component = parts.topology.component_of_face
+    found = find_interior(parts.points, parts.faces, patch_of_face(parts.topology, cut), parts.shells, component, cut)
+    # components that meet themselves and nothing else
+    both = component[intersecting]
+    folded = np.setdiff1d(both, both[both[:, 0] != both[:, 1]])
+    small = [number for number in folded if _share(parts, found, number) < FOLD]
+    return Interior(
+        tuple(patch for patch in found.patches if component[patch[0]] not in small),
+        found.faces[~np.isin(component[found.faces], small)],
+        found.skipped,
     )
+
+
+def _share(parts: _Parts, found: Interior, number: int) -> float:
+    """How much of a component's area, at most, lies inside."""
+    faces = np.concatenate([*found.patches, found.faces])
+    faces = faces[parts.topology.component_of_face[faces] == number]
+    corners = parts.points[parts.faces[faces]]
+    vectors = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    return float(np.linalg.norm(vectors, axis=1).sum() / 2 / parts.areas[number])
 
 
 def _is_simple(topology: Topology, loop: NDArray[np.int64]) -> bool:

@@ -8,6 +8,7 @@ against what it promises (``completeness``) before its geometry is believed.
 from __future__ import annotations
 
 import io
+import logging
 import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
 SUFFIXES = (".ply", ".obj", ".stl", ".off", ".glb", ".gltf", ".3mf", ".dae")
 """The kinds of files ``load_mesh`` reads, in lower case."""
 
+_SILENT = logging.NullHandler()
 _REMEDY = "write it again from its source"
 
 
@@ -48,18 +50,27 @@ def load_mesh(path: str | Path) -> Mesh:
     data = _read(path)
     suffix = path.suffix.lower()
     try:
-        if suffix == ".ply":
-            vertices, faces, attributes = read_ply(data)
-            return Mesh(vertices, faces, (Body(path.stem, 0, len(faces)),), attributes, path)
-        data, promised = completeness.check(suffix, data)
-        mesh = _mesh_of_scene(_load_scene(path, suffix, data), path)
-        if promised is not None and len(mesh.faces) != promised:
-            raise ValueError(f"corrupt: it has {promised} triangles, of which {len(mesh.faces)} make sense")
-        return mesh
+        # numbers that make no sense are refused or reported, not warned of on the terminal
+        with np.errstate(all="ignore"):
+            return _parse(path, suffix, data)
+    except MemoryError:
+        raise  # says nothing about the file
     # The parsers are not written against hostile files: a stray byte surfaces as any exception of numpy,
     # zipfile, json, lxml or collada, and each of them means the same to the user.
     except Exception as error:
         raise InputError(path, f"unreadable {suffix[1:]} file: {_reason(error)}", _REMEDY) from error
+
+
+def _parse(path: Path, suffix: str, data: bytes) -> Mesh:
+    """The mesh in a file's bytes. Raises whatever its parser does, ValueError where less is there than promised."""
+    if suffix == ".ply":
+        vertices, faces, attributes = read_ply(data)
+        return Mesh(vertices, faces, (Body(path.stem, 0, len(faces)),), attributes, path)
+    data, promised = completeness.check(suffix, data)
+    mesh = _mesh_of_scene(_load_scene(path, suffix, data), path)
+    if promised is not None and len(mesh.faces) != promised:
+        raise ValueError(f"corrupt: it has {promised} triangles, of which {len(mesh.faces)} make sense")
+    return mesh
 
 
 def _reason(error: Exception) -> str:
@@ -98,9 +109,10 @@ def _load_scene(path: Path, suffix: str, data: bytes) -> trimesh.Scene:
     """The file as trimesh sees it; files it names are looked for beside it only."""
     import trimesh
 
+    # what it has to say about a file, tracebacks included, goes to whoever listens and not to the terminal
+    logging.getLogger("trimesh").addHandler(_SILENT)
     resolver = trimesh.resolvers.FilePathResolver(str(path))
-    with warnings.catch_warnings(), np.errstate(all="ignore"):
-        # NaN coordinates and odd numbers make numpy warn; the checks report them properly
+    with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         return trimesh.load_scene(io.BytesIO(data), file_type=suffix[1:], resolver=resolver, process=False)
 

@@ -5,22 +5,27 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from .topology import Topology
+from .topology import Topology, connected_components
 
 
-def patch_of_face(topology: Topology) -> NDArray[np.int64]:
+def patch_of_face(topology: Topology, left_out: NDArray[np.int64] | None = None) -> NDArray[np.int64]:
     """(m,) the patch of each face: faces joined over edges with exactly two faces; -1 for faces not live.
 
+    left_out  faces that belong to no patch and join none
     Patches end at boundary and non-manifold edges. All of a patch lies on one side of everything it does not
-    pass through.
+    pass through: without the faces that meet others, on one side of everything.
     """
-    if len(topology.nonmanifold_edges) == 0:
+    cut = ~topology.live
+    if left_out is not None:
+        cut[left_out] = True
+    if not cut[topology.live].any() and len(topology.nonmanifold_edges) == 0:
         return topology.component_of_face
-    left, right = (side // 3 for side in _neighbours(topology))
-    patch = _components(len(topology.faces), left, right)
-    patch[~topology.live] = -1
-    # live faces keep consecutive numbers
-    patch[topology.live] = np.unique(patch[topology.live], return_inverse=True)[1]
+    left, right = (side // 3 for side in topology.side_pairs)
+    joined = ~(cut[left] | cut[right])
+    patch = connected_components(len(topology.faces), left[joined], right[joined])
+    patch[cut] = -1
+    # the others keep consecutive numbers
+    patch[~cut] = np.unique(patch[~cut], return_inverse=True)[1]
     return patch
 
 
@@ -33,7 +38,7 @@ def orient_consistently(topology: Topology) -> tuple[NDArray[np.int64], NDArray[
     turned = np.zeros(len(topology.faces), bool)
     if len(topology.misoriented_edges) == 0:
         return topology.faces, turned
-    left, right = _neighbours(topology)
+    left, right = topology.side_pairs
     forward = topology.side_direction.ravel()
     agrees = forward[left] != forward[right]
     left, right = left // 3, right // 3
@@ -41,7 +46,7 @@ def orient_consistently(topology: Topology) -> tuple[NDArray[np.int64], NDArray[
     # two copies of each face, as it is and turned: agreeing neighbours join like copies, others unlike ones
     mate = np.where(agrees, right, right + count)
     other = np.where(agrees, right + count, right)
-    label = _components(2 * count, np.concatenate([left, left + count]), np.concatenate([mate, other]))
+    label = connected_components(2 * count, np.concatenate([left, left + count]), np.concatenate([mate, other]))
     kept, flipped = label[:count], label[count:]
     # one half of each patch's copies keeps the face with the lesser label; the area decides between halves
     corners = topology.points[topology.faces]
@@ -55,21 +60,3 @@ def orient_consistently(topology: Topology) -> tuple[NDArray[np.int64], NDArray[
     faces = topology.faces.copy()
     faces[turned] = faces[turned][:, ::-1]
     return faces, turned
-
-
-def _neighbours(topology: Topology) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """The two sides (3 * face + corner) of every edge with exactly two faces."""
-    edge_of_side = topology.face_edges.ravel()
-    sides = np.flatnonzero(edge_of_side >= 0)
-    sides = sides[topology.faces_per_edge[edge_of_side[sides]] == 2]
-    sides = sides[np.argsort(edge_of_side[sides], kind="stable")]
-    return sides[0::2], sides[1::2]
-
-
-def _components(count: int, a: NDArray[np.int64], b: NDArray[np.int64]) -> NDArray[np.int64]:
-    """(count,) labels of the connected components of a graph with links a[i] - b[i]."""
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
-    links = coo_array((np.ones(len(a), bool), (a, b)), shape=(count, count))
-    return connected_components(links, directed=False)[1].astype(np.int64)

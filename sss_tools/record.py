@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import warnings
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -13,10 +14,12 @@ import numpy as np
 
 from .closedness import Closedness
 from .files import write_atomically
+from .medium import Medium
 from .mesh import Mesh
 from .validation.outcome import RULES_VERSION, MeshReport
 
 SCHEMA = "sss-record/1"
+OTHER_GEOMETRY = "belongs to other geometry: the mesh has changed since"
 
 
 class RecordWarning(UserWarning):
@@ -28,9 +31,11 @@ class Record:
     """A record that belongs to its mesh.
 
     closedness  the verdict
-    material    the preset the mesh was judged against, if any
-    findings    rule objects as in the report of a check
+    material    the name of what the mesh was judged against, if anything
     components  as in the report of a check
+    findings    rule objects as in the report of a check, waived ones included
+    waivers     code -> the reason the user gave for accepting what the rule finds in this geometry
+    repairs     what was done to the mesh to make it what it is
     """
 
     hash: str
@@ -38,6 +43,8 @@ class Record:
     material: str | None
     components: list[dict[str, Any]]
     findings: list[dict[str, Any]]
+    waivers: dict[str, str]
+    repairs: list[dict[str, Any]]
 
 
 def geometry_hash(mesh: Mesh) -> str:
@@ -60,24 +67,49 @@ def record_path(mesh_path: str | Path) -> Path:
     return mesh_path.with_name(mesh_path.name + ".sss.json")
 
 
-def write_record(mesh_path: str | Path, mesh: Mesh, report: MeshReport, material: str | None = None) -> Path:
-    """Write what ``report`` says about ``mesh`` beside it. Raises OSError where that is not possible."""
+def write_record(
+    mesh_path: str | Path,
+    mesh: Mesh,
+    report: MeshReport,
+    material: str | None = None,
+    medium: Medium | None = None,
+    unit: str | None = None,
+    waivers: Mapping[str, str] | None = None,
+    repairs: Sequence[Mapping[str, Any]] = (),
+) -> Path:
+    """Write what ``report`` says about ``mesh`` beside it. Raises OSError where that is not possible.
+
+    material, medium, unit  what it was judged against: its name, its coefficients per mesh unit, what that unit is
+    waivers                 code -> reason
+    repairs                 what was done to the mesh to make it what it is
+    """
     from .report.json_report import rule_object
 
     record = {
         "schema": SCHEMA,
-        "hash": geometry_hash(mesh),
+        "hash": report.hash or geometry_hash(mesh),
         "rules": RULES_VERSION,
         "material": material,
+        "medium": None if medium is None else _medium_object(medium),
+        "unit": unit,
         "closedness": report.closedness,
         "components": report.components,
-        "findings": [rule_object(finding) for finding in report.findings],
-        "waivers": [],
-        "repairs": [],
+        "findings": [rule_object(finding) for finding in report.shown],
+        "waivers": [{"code": code, "reason": reason} for code, reason in sorted((waivers or {}).items())],
+        "repairs": [dict(repair) for repair in repairs],
     }
     path = record_path(mesh_path)
     write_atomically(path, (json.dumps(record, indent=1) + "\n").encode())
     return path
+
+
+def _medium_object(medium: Medium) -> dict[str, Any]:
+    return {
+        "sigma_a": medium.sigma_a.tolist(),
+        "sigma_s": medium.sigma_s.tolist(),
+        "g": medium.g,
+        "ior": medium.ior,
+    }
 
 
 def read_record(mesh_path: str | Path, mesh: Mesh) -> Record | None:
@@ -87,20 +119,15 @@ def read_record(mesh_path: str | Path, mesh: Mesh) -> Record | None:
     """
     path = record_path(mesh_path)
     try:
-        data = json.loads(path.read_bytes())
-    except FileNotFoundError:
-        return None
-    except (OSError, ValueError) as error:
-        _ignore(path, f"cannot be read ({error})")
-        return None
-    if not isinstance(data, dict) or data.get("schema") != SCHEMA:
-        _ignore(path, f"is not of schema {SCHEMA}")
-        return None
-    if data.get("hash") != geometry_hash(mesh):
-        _ignore(path, "belongs to other geometry: the mesh has changed since")
-        return None
-    if data.get("rules") != RULES_VERSION:
-        _ignore(path, "was made by other rules")
+        data = _parse(path)
+        if data is None:
+            return None
+        if data.get("hash") != geometry_hash(mesh):
+            raise ValueError(OTHER_GEOMETRY)
+        if data.get("rules") != RULES_VERSION:
+            raise ValueError("was made by other rules")
+    except ValueError as error:
+        _ignore(path, str(error))
         return None
     try:
         return Record(
@@ -109,10 +136,49 @@ def read_record(mesh_path: str | Path, mesh: Mesh) -> Record | None:
             material=data["material"],
             components=list(data["components"]),
             findings=list(data["findings"]),
+            waivers=_waivers(data),
+            repairs=list(data["repairs"]),
         )
     except (KeyError, TypeError, ValueError) as error:
         _ignore(path, f"is incomplete ({type(error).__name__}: {error})")
         return None
+
+
+def read_waivers(mesh_path: str | Path, digest: str) -> tuple[dict[str, str], list[str]]:
+    """What the user accepts in geometry with this hash, code -> reason; and the codes waived in other geometry.
+
+    A waiver is bound to the geometry alone: rules that have become stricter do not undo it. Raises ValueError,
+    with the rest of a sentence about the record, for one that cannot be read.
+    """
+    data = _parse(record_path(mesh_path))
+    if data is None:
+        return {}, []
+    try:
+        waivers = _waivers(data)
+    except (KeyError, TypeError) as error:
+        raise ValueError(f"is incomplete ({type(error).__name__}: {error})") from None
+    if data.get("hash") != digest:
+        if not waivers:
+            raise ValueError(OTHER_GEOMETRY)
+        return {}, sorted(waivers)
+    return waivers, []
+
+
+def _parse(path: Path) -> dict[str, Any] | None:
+    """What a record says; None where there is none. Raises ValueError for what is no record."""
+    try:
+        data = json.loads(path.read_bytes())
+    except FileNotFoundError:
+        return None
+    except (OSError, ValueError, RecursionError) as error:
+        raise ValueError(f"cannot be read ({error})") from None
+    if not isinstance(data, dict) or data.get("schema") != SCHEMA:
+        raise ValueError(f"is not of schema {SCHEMA}")
+    return data
+
+
+def _waivers(data: dict[str, Any]) -> dict[str, str]:
+    return {str(waiver["code"]): str(waiver["reason"]) for waiver in data["waivers"]}
 
 
 def _ignore(path: Path, problem: str) -> None:

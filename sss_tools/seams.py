@@ -25,7 +25,7 @@ def edges_closed_by_welding(topology: Topology, tolerance: float) -> NDArray[np.
         return np.zeros(0, np.int64)
     used, ends = np.unique(topology.edges[boundary], return_inverse=True)
     ends = ends.reshape(-1, 2)
-    cluster = _clusters(topology.points[used], tolerance)
+    cluster = cluster_points(topology.points[used], tolerance)
     if (cluster == np.arange(len(used))).all():
         return np.zeros(0, np.int64)
     pairs = np.sort(cluster[ends], axis=1)
@@ -33,7 +33,7 @@ def edges_closed_by_welding(topology: Topology, tolerance: float) -> NDArray[np.
     return boundary[(uses[twin.ravel()] > 1) | (pairs[:, 0] == pairs[:, 1])]
 
 
-def _clusters(points: NDArray[np.float64], tolerance: float) -> NDArray[np.int64]:
+def cluster_points(points: NDArray[np.float64], tolerance: float) -> NDArray[np.int64]:
     """(k,) for each point the least index it is joined to by steps of at most ``tolerance``."""
     along = points @ _GENERIC
     order = np.argsort(along, kind="stable")

@@ -55,6 +55,13 @@ class Topology:
         self._same_edge = edge_of_sorted[1:] == edge_of_sorted[:-1]
 
     @cached_property
+    def side_pairs(self) -> tuple[Indices, Indices]:
+        """The two sides (3 * face + k) of every edge with exactly two faces, in the order of the edges."""
+        first = np.cumsum(self.faces_per_edge) - self.faces_per_edge
+        first = first[self.faces_per_edge == 2]
+        return self._sides[first], self._sides[first + 1]
+
+    @cached_property
     def boundary_edges(self) -> Indices:
         """(b,) edges with one face."""
         return np.flatnonzero(self.faces_per_edge == 1)
@@ -83,7 +90,7 @@ class Topology:
             return []
         used, compact = np.unique(ends, return_inverse=True)
         compact = compact.reshape(-1, 2)
-        label = _components(len(used), compact[:, 0], compact[:, 1])[compact[:, 0]]
+        label = connected_components(len(used), compact[:, 0], compact[:, 1])[compact[:, 0]]
         order = np.argsort(label, kind="stable")
         cuts = np.flatnonzero(np.diff(label[order])) + 1
         return sorted(np.split(self.boundary_edges[order], cuts), key=lambda loop: (-len(loop), loop[0]))
@@ -95,7 +102,7 @@ class Topology:
         Faces belong together that share an edge, whatever its number of faces; a shared point is not enough.
         """
         face = self._sides // 3
-        label = _components(len(self.faces), face[:-1][self._same_edge], face[1:][self._same_edge])
+        label = connected_components(len(self.faces), face[:-1][self._same_edge], face[1:][self._same_edge])
         component = np.full(len(self.faces), -1, np.int64)
         live_labels = label[self.live]
         _, first, inverse = np.unique(live_labels, return_index=True, return_inverse=True)
@@ -120,7 +127,7 @@ class Topology:
         forward = self.side_direction.ravel()[side]
         # side k touches corners k and k + 1; sort the two by the edge's direction so that they match up
         tail, head = np.where(forward, side, following), np.where(forward, following, side)
-        label = _components(
+        label = connected_components(
             len(corner_point),
             np.concatenate([tail[:-1][self._same_edge], head[:-1][self._same_edge]]),
             np.concatenate([tail[1:][self._same_edge], head[1:][self._same_edge]]),
@@ -182,10 +189,9 @@ def _number_runs(ordered: Indices) -> tuple[Indices, Indices]:
     return np.cumsum(starts) - 1, ordered[starts]
 
 
-def _components(count: int, a: Indices, b: Indices) -> Indices:
+def connected_components(count: int, a: Indices, b: Indices) -> Indices:
     """(count,) component labels of the undirected graph with ``count`` nodes and links a[i] - b[i]."""
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
+    from scipy.sparse import coo_array, csgraph
 
     links = coo_array((np.ones(len(a), bool), (a, b)), shape=(count, count))
-    return connected_components(links, directed=False)[1].astype(np.int64)
+    return csgraph.connected_components(links, directed=False)[1].astype(np.int64)

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
+from sss_tools.keys import Key, Kind, Place, one_of, read_variant, to_colour, to_number
 from sss_tools.medium import PRESETS, Medium
 
 from .description import Diffuse, Material, Mirror, Translucent
-from .keys import Key, Kind, Place, one_of, read_variant, to_colour, to_number
 
 _COEFFICIENT = Kind("one number or three, each 0 or more, in 1/unit", to_colour, lambda c: (c >= 0).all())
 _LENGTH = Kind("one number or three, each above 0, in units", to_colour, lambda r: (r > 0).all())

@@ -3,31 +3,14 @@
 from __future__ import annotations
 
 import tomllib
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
 from sss_tools.errors import InputError
-from sss_tools.loading import load_mesh
-from sss_tools.medium import UNITS
-from sss_tools.mesh import Mesh
-
-from .description import (
-    Camera,
-    DirectionalLight,
-    EnvironmentLight,
-    Light,
-    Material,
-    PointLight,
-    RectangleLight,
-    Scene,
-    SceneObject,
-    SphereLight,
-)
-from .environment_image import is_file, read_environment_image
-from .fingerprint import with_hash
-from .keys import (
+from sss_tools.keys import (
     Key,
     Kind,
     Place,
@@ -41,8 +24,28 @@ from .keys import (
     to_vector,
     to_whole_numbers,
 )
+from sss_tools.loading import load_mesh
+from sss_tools.medium import UNITS
+from sss_tools.mesh import Mesh
+
+from .description import (
+    Camera,
+    DirectionalLight,
+    EnvironmentLight,
+    HoleHandling,
+    Light,
+    Material,
+    PointLight,
+    RectangleLight,
+    Scene,
+    SceneObject,
+    ShaderChoice,
+    SphereLight,
+)
+from .environment_image import is_file, read_environment_image
+from .fingerprint import with_hash
 from .materials import read_material
-from .transform import read_transform, transformed
+from .transform import Matrix, read_transform, transformed
 
 MOST_PIXELS = 2**26
 """The film keeps some 60 bytes a pixel: 4 GB at this size, 8192 x 8192."""
@@ -103,6 +106,36 @@ _OBJECT = {
 }
 
 
+@dataclass(frozen=True, eq=False)
+class Placement:
+    """An object of a scene file, before its mesh is read.
+
+    material_name  what the file calls its material
+    matrix         (4, 4) from mesh units to scene units, acting on columns
+    place          where the file says so
+    """
+
+    name: str
+    mesh_path: Path
+    material: Material
+    material_name: str
+    matrix: Matrix
+    normals: Literal["flat", "smooth"]
+    shader: ShaderChoice
+    hole_handling: HoleHandling
+    place: Place
+
+
+@dataclass(frozen=True, eq=False)
+class Outline:
+    """What a scene file says, before any mesh is read."""
+
+    unit: str
+    camera: Camera
+    lights: tuple[Light, ...]
+    placements: tuple[Placement, ...]
+
+
 def load_scene(path: str | Path) -> Scene:
     """The scene that a TOML file describes, meshes and images included, with its hash.
 
@@ -110,6 +143,15 @@ def load_scene(path: str | Path) -> Scene:
     syntax, unknown and missing keys, values out of range, degenerate cameras and transforms, missing or
     corrupt meshes and images, no object, no light.
     """
+    path = Path(path)
+    outline = read_outline(path)
+    meshes: dict[Path, Mesh] = {}
+    objects = tuple(_object(placement, meshes) for placement in outline.placements)
+    return with_hash(Scene(outline.unit, outline.camera, outline.lights, objects, path=path))
+
+
+def read_outline(path: str | Path) -> Outline:
+    """The scene that a TOML file describes, without its meshes. Raises InputError as ``load_scene`` does."""
     path = Path(path)
     document = Place(path, "the scene file")
     tables = read_keys(_parse(path), _FILE, document)
@@ -121,10 +163,10 @@ def load_scene(path: str | Path) -> Scene:
     if not lights:
         raise document.error("there is no [[light]], so nothing would be lit", "add one")
     materials = _materials(tables["material"], unit, document)
-    objects = _objects(tables["object"], materials, path)
-    if not objects:
+    placements = _placements(tables["object"], materials, path)
+    if not placements:
         raise document.error("there is no [[object]], so there is nothing to render", "add one")
-    return with_hash(Scene(unit, camera, lights, objects, path=path))
+    return Outline(unit, camera, lights, placements)
 
 
 def _parse(path: Path) -> dict[str, Any]:
@@ -203,32 +245,44 @@ def _materials(tables: Any, unit: str, document: Place) -> dict[str, Material]:
     return {name: read_material(table, unit, places[name]) for name, table in tables.items()}
 
 
-def _objects(tables: Any, materials: dict[str, Material], path: Path) -> tuple[SceneObject, ...]:
-    meshes: dict[Path, Mesh] = {}
-    objects: dict[str, SceneObject] = {}
+def _placements(tables: Any, materials: dict[str, Material], path: Path) -> tuple[Placement, ...]:
+    placements: dict[str, Placement] = {}
     for table, place in _entries(tables, "object", path):
         values = read_keys(table, _OBJECT, place)
         mesh_path = path.parent / values["mesh"]
         name = values["name"] or mesh_path.stem
-        if name in objects:
+        if name in placements:
             raise place.error(f'two objects have the name "{name}"', 'give each its own "name"')
         material = values["material"]
         if material not in materials:
             hint = did_you_mean(material, materials) if materials else f"add [material.{material}]"
             raise place.error(f'unknown material "{material}" in {place.name}', hint)
-        matrix = read_transform(values["transform"], place.within(f'"transform" of {place.name}'))
-        source = _mesh(mesh_path, place, meshes)
-        objects[name] = SceneObject(
+        placements[name] = Placement(
             name=name,
-            mesh=_usable(transformed(source, matrix), mesh_path, place),
-            material=materials[material],
             mesh_path=mesh_path,
+            material=materials[material],
+            material_name=material,
+            matrix=read_transform(values["transform"], place.within(f'"transform" of {place.name}')),
             normals=values["normals"],
             shader=values["shader"],
             hole_handling=values["hole_handling"],
-            source=source,
+            place=place,
         )
-    return tuple(objects.values())
+    return tuple(placements.values())
+
+
+def _object(placement: Placement, meshes: dict[Path, Mesh]) -> SceneObject:
+    source = _mesh(placement.mesh_path, placement.place, meshes)
+    return SceneObject(
+        name=placement.name,
+        mesh=_usable(transformed(source, placement.matrix), placement.mesh_path, placement.place),
+        material=placement.material,
+        mesh_path=placement.mesh_path,
+        normals=placement.normals,
+        shader=placement.shader,
+        hole_handling=placement.hole_handling,
+        source=source,
+    )
 
 
 def _mesh(path: Path, place: Place, meshes: dict[Path, Mesh]) -> Mesh:

@@ -8,13 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sss_tools.errors import InputError
+from sss_tools.keys import did_you_mean
 from sss_tools.medium import PRESETS, Medium
 from sss_tools.mesh import Mesh
 
 from .camera import view_basis
 from .description import Camera, EnvironmentLight, Light, RectangleLight, Scene, SceneObject, Translucent
 from .fingerprint import with_hash
-from .keys import did_you_mean
 
 MEAN_FREE_PATH = 0.02
 """Of the default medium, as a share of the mesh's longest side."""

@@ -7,9 +7,8 @@ import dataclasses
 import numpy as np
 from numpy.typing import NDArray
 
+from sss_tools.keys import Key, Kind, Place, read_keys, to_number, to_vector
 from sss_tools.mesh import Mesh
-
-from .keys import Key, Kind, Place, read_keys, to_number, to_vector
 
 Matrix = NDArray[np.float64]
 

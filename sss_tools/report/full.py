@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from typing import Any
 
 from ..validation.outcome import FixSafety, MeshReport, Outcome, RuleReport, Severity
 
@@ -25,20 +26,31 @@ _FIXES = {
 _SHOWN = 6
 
 
-def render(reports: Sequence[MeshReport], verbose: bool = False) -> str:
+def chunks(reports: Sequence[MeshReport], verbose: bool = False) -> Iterator[str]:
     """All meshes one after the other; ``verbose`` lists the rules that passed, too."""
-    return "\n".join(section(report, verbose) for report in reports)
+    for number, report in enumerate(reports):
+        yield "\n" * (number > 0) + section(report, verbose)
+
+
+def render(reports: Sequence[MeshReport], verbose: bool = False) -> str:
+    """The whole report."""
+    return "".join(chunks(reports, verbose))
 
 
 def section(report: MeshReport, verbose: bool = False) -> str:
     """One mesh."""
-    lines = [f"{report.path}: {_headline(report)}"]
+    name = report.path if report.object is None else f"{report.path} ({report.object})"
+    lines = [f"{name}: {_headline(report)}"]
+    if report.repair is not None:
+        lines += _repair(report.repair)
     if report.closedness is not None:
         lines += _verdict(report)
     elif report.error is not None:
         lines.append(f"  {report.error.removeprefix(f'{report.path}: ')}")
     for rule in report.findings:
         lines += _finding(rule)
+    for rule in report.waived:
+        lines += _waived(rule)
     lines += _not_run(report)
     if verbose:
         passed = [f"{rule.code} {rule.name}" for rule in report.rules if rule.outcome == Outcome.PASS]
@@ -54,6 +66,8 @@ def _headline(report: MeshReport) -> str:
         return "unreadable"
     counts = [(sum(rule.severity == severity for rule in report.findings), severity) for severity in Severity]
     tally = ", ".join(f"{count} {severity}{'s' * (count > 1)}" for count, severity in counts if count)
+    if report.waived:
+        tally = f"{tally or 'no findings'}, {len(report.waived)} waived"
     return f"{report.vertices} vertices, {report.faces} faces: {tally or 'no findings'}"
 
 
@@ -69,6 +83,30 @@ def _verdict(report: MeshReport) -> list[str]:
     ]
 
 
+def _repair(repair: dict[str, Any]) -> list[str]:
+    """What was done, what that changed, and what it cost."""
+    lines = [f"  repair {repair['status']}" + (f": {repair['reason']}" if repair["reason"] else "")]
+    for rung in repair["rungs"]:
+        if rung["status"] != "skipped" or rung["reason"] != "nothing to do":
+            lines.append(f"          {rung['name']} {rung['status']}: {rung['reason']}")
+    before, after = repair["before"], repair["after"]
+    if after:
+        for name in ("faces", "area", "volume"):
+            old, new = (_amount(values.get(name)) for values in (before, after))
+            lines.append(f"          {name}: {old} -> {new}")
+        lines.append(
+            f"          greatest distance from the old visible surface: {after['distance']:.2%} of the diagonal"
+        )
+        lines.append(f"          lost: {'; '.join(repair['lost']) or 'nothing'}")
+    if repair["output"]:
+        lines.append(f"          written to {repair['output']}; what follows is about that file")
+    return lines
+
+
+def _amount(value: float | None) -> str:
+    return "unknown" if value is None else f"{value:.6g}"
+
+
 def _finding(rule: RuleReport) -> list[str]:
     lines = [f"  {rule.severity:<7} {rule.code} {rule.name}: {rule.message}"]
     where = _where(rule)
@@ -77,6 +115,14 @@ def _finding(rule: RuleReport) -> list[str]:
     lines.append(f"          why:   {rule.why}")
     lines.append(f"          fix:   {_FIXES[rule.fix]} (sss-check --explain {rule.code})")
     return lines
+
+
+def _waived(rule: RuleReport) -> list[str]:
+    lines = [f"  {Outcome.WAIVED:<7} {rule.code} {rule.name}: {rule.message}"]
+    where = _where(rule)
+    if where:
+        lines.append(f"          where: {where}")
+    return [*lines, f"          waived: {rule.reason}"]
 
 
 def _where(rule: RuleReport) -> str:
@@ -103,11 +149,7 @@ def _some(noun: str, items: Iterable[str], count: int) -> str:
 
 def _not_run(report: MeshReport) -> list[str]:
     """The rules that did not run, gathered by reason."""
-    codes: dict[str, list[str]] = {}
-    for rule in report.rules:
-        if rule.outcome == Outcome.NOT_RUN:
-            codes.setdefault(rule.reason or "no reason given", []).append(rule.code)
     return [
-        f"  not run ({reason}): {'all' if len(found) == len(report.rules) else ' '.join(found)}"
-        for reason, found in codes.items()
+        f"  not run ({reason}): {'all' if len(rules) == len(report.rules) else ' '.join(rule.code for rule in rules)}"
+        for reason, rules in report.not_run.items()
     ]

@@ -9,7 +9,7 @@ from .rule import Finding, NotRun, Rule, Subject, plural
 
 
 def find_internal_geometry(subject: Subject) -> Finding | None:
-    """Components, patches between non-manifold edges, and parts of overlapping shells inside solids."""
+    """Components, patches between non-manifold edges or intersections, and faces that reach into solids."""
     assessment = subject.assessment
     interior = assessment.interior
     nested = [number for number, part in enumerate(assessment.components) if part.role == "internal"]
@@ -20,14 +20,15 @@ def find_internal_geometry(subject: Subject) -> Finding | None:
     whole = np.unique(np.concatenate([assessment.faces_of(nested), *interior.patches]))
     apart = [patch for patch in interior.patches if assessment.component_of_face[patch[0]] not in nested]
     single = np.setdiff1d(interior.faces, whole)
-    overlapping = np.setdiff1d(assessment.component_of_face[single], nested)
+    accounted = [*nested, *(assessment.component_of_face[patch[0]] for patch in apart)]
+    overlapping = np.setdiff1d(assessment.component_of_face[single], accounted)
     found = []
     if nested:
         found.append(f"{plural(len(nested), 'closed component')} inside a solid")
     if apart:
         found.append(f"{plural(len(apart), 'patch', 'patches')} with solid on both sides")
     if len(overlapping):
-        found.append(f"{plural(len(overlapping), 'component')} reaching into another (found by samples)")
+        found.append(f"{plural(len(overlapping), 'component')} reaching into a solid with a few faces")
     if interior.skipped:
         found.append(f"{plural(interior.skipped, 'smaller patch', 'smaller patches')} not looked at")
     return Finding(

@@ -2,8 +2,26 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from .outcome import FixSafety, Severity
-from .rule import Rule, without_engine, without_scene
+from .rule import Finding, Rule, Subject, plural, without_scene
+
+
+def find_self_intersections(subject: Subject) -> Finding | None:
+    """Pairs of faces that meet elsewhere than in their common side or corner."""
+    pairs = subject.assessment.self_intersections
+    if len(pairs) == 0:
+        return None
+    faces = np.unique(pairs)
+    return Finding(
+        count=len(pairs),
+        message=f"{plural(len(pairs), 'pair')} of faces pass through or touch each other, "
+        f"{plural(len(faces), 'face')} in all (exact, no tolerance)",
+        faces=faces,
+        face_pairs=pairs,
+    )
+
 
 SELF_INTERSECTION = Rule(
     code="SSS302",
@@ -14,7 +32,7 @@ SELF_INTERSECTION = Rule(
     "medium.",
     fix="unite the overlapping parts",
     fix_safety=FixSafety.UNSAFE,
-    check=without_engine,
+    check=find_self_intersections,
 )
 
 OVERLAPPING_SOLIDS = Rule(

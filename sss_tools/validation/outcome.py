@@ -43,7 +43,7 @@ UNUSABLE = ("SSS602", "SSS701", "SSS702")
 class RuleReport:
     """How one rule ended on one mesh; the fields of the JSON object, and ``why`` and ``raised`` besides.
 
-    reason    why it did not run, or was waived
+    reason    why it did not run, or was waived: then what was found is here all the same
     count     of what the rule's name names; 0 where it found nothing
     faces, edges, vertices, face_pairs   indices in file order, at most ``run.LISTED`` of each
     truncated whether more were found than are listed
@@ -75,14 +75,21 @@ class MeshReport:
 
     status      "ok", or "unreadable" where no mesh came out of the file
     error       one line saying why the file cannot be used, or None
+    hash        ``record.geometry_hash`` of what the file holds; None where that is not known
+    object      the name of the scene's object that was looked at, where the mesh was checked as part of a scene
     closedness, components  as in CONTRACTS section 1; None and [] where they could not be found out
+    repair      what became of it, as in CONTRACTS section 1; None where nobody asked. All the rest is then about
+                the result, where one was written
     warnings    what went wrong beside the check (an unwritable record), one line each
+    cached      the findings were known from an earlier check of the same geometry
     seconds     wall time
     """
 
     path: str
     status: str = "ok"
     error: str | None = None
+    hash: str | None = None
+    object: str | None = None
     vertices: int | None = None
     faces: int | None = None
     bbox: list[list[float]] | None = None
@@ -91,13 +98,34 @@ class MeshReport:
     closedness: dict[str, Any] | None = None
     components: list[dict[str, Any]] = field(default_factory=list)
     rules: list[RuleReport] = field(default_factory=list)
+    repair: dict[str, Any] | None = None
     warnings: list[str] = field(default_factory=list)
+    cached: bool = False
     seconds: float = 0.0
 
     @property
     def findings(self) -> list[RuleReport]:
         """The rules that found something, in the order of their codes."""
         return [rule for rule in self.rules if rule.outcome == Outcome.FAIL]
+
+    @property
+    def waived(self) -> list[RuleReport]:
+        """The rules that found something which the user accepts."""
+        return [rule for rule in self.rules if rule.outcome == Outcome.WAIVED]
+
+    @property
+    def shown(self) -> list[RuleReport]:
+        """Findings and waived ones, in the order of their codes."""
+        return [rule for rule in self.rules if rule.outcome in (Outcome.FAIL, Outcome.WAIVED)]
+
+    @property
+    def not_run(self) -> dict[str, list[RuleReport]]:
+        """The rules that did not run, by reason."""
+        gathered: dict[str, list[RuleReport]] = {}
+        for rule in self.rules:
+            if rule.outcome == Outcome.NOT_RUN:
+                gathered.setdefault(rule.reason or "no reason given", []).append(rule)
+        return gathered
 
     @property
     def exit_status(self) -> int:

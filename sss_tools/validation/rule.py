@@ -23,16 +23,35 @@ class NotRun(Exception):
     """A rule that cannot look says why; it ends as ``not-run`` with this reason, never as ``pass``."""
 
 
+@dataclass(frozen=True, eq=False)
+class Neighbour:
+    """Another object of the scene, in the frame and unit of the mesh under examination.
+
+    translucent  whether light enters it
+    """
+
+    name: str
+    mesh: Mesh
+    translucent: bool = True
+
+
 @dataclass(frozen=True)
 class Context:
     """What the command knows besides the mesh.
 
-    medium  what the mesh is made of, coefficients per mesh unit; None where no material was named
-    unit    what one mesh unit is: mm, cm, m, inch; None where it was not said
+    medium           what the mesh is made of, coefficients per mesh unit; None where no material was named
+    unit             what one mesh unit is: mm, cm, m, inch; None where it was not said
+    neighbours       the other objects of its scene; None where no scene was given
+    pixel_footprint  width in mesh units of what a pixel covers where the mesh is nearest to the camera; None
+                     without a scene, and where the mesh is behind the camera
+    opaque           the scene gives the mesh a material that light does not enter
     """
 
     medium: Medium | None = None
     unit: str | None = None
+    neighbours: tuple[Neighbour, ...] | None = None
+    pixel_footprint: float | None = None
+    opaque: bool = False
 
 
 class Subject:

@@ -13,13 +13,17 @@ from ..errors import InputError
 from ..loading import load_mesh
 from ..medium import Medium
 from ..mesh import Mesh
-from ..record import write_record
+from ..record import geometry_hash, write_record
+from ..waivers import waive
 from .outcome import UNUSABLE, FixSafety, MeshReport, Outcome, RuleReport
 from .rule import Context, Finding, NotRun, Rule, Subject, all_rules
 from .settings import Settings
 
 LISTED = 1000
 """How many indices of each kind a report lists; beyond that it is ``truncated``."""
+
+OPAQUE = "opaque in this scene: no light enters it"
+"""Why rules about the inside do not run on floors and walls."""
 
 FAULTS = (
     *(ArithmeticError, AssertionError, AttributeError, LookupError, NotImplementedError),
@@ -41,14 +45,57 @@ def check_file(path: str | Path, settings: Settings | None = None) -> MeshReport
         report = _report_unreadable(path, error, settings)
         report.seconds = time.perf_counter() - start
         return report
-    medium = Medium.preset(settings.material, settings.unit or "mm") if settings.material else None
-    report = check_mesh(mesh, Context(medium, settings.unit), settings, path)
+    context, problems = _context(mesh, settings)
+    report = _known_or_checked(mesh, context, settings, path)
+    repairs: list[dict[str, Any]] = []
+    if settings.fix and report.error is None:
+        report, result = _repaired(path, mesh, context, report, settings)
+        if result is not None and report.repair is not None and report.repair["output"] is not None:
+            # waivers and record are those of the result: it is other geometry
+            path, mesh, report.hash = report.repair["output"], result, geometry_hash(result)
+            repairs = [rung for rung in report.repair["rungs"] if rung["status"] == "applied"]
+    report.warnings += problems
+    if settings.surroundings is not None:
+        report.object = settings.surroundings.placed.name
+    waivers = waive(report, path, settings)
     if settings.record and report.closedness is not None:
         try:
-            write_record(path, mesh, report, settings.material)
+            write_record(path, mesh, report, settings.material, context.medium, settings.unit, waivers, repairs)
         except OSError as error:
             report.warnings.append(f"{path}: the record could not be written ({error.strerror or error})")
     report.seconds = time.perf_counter() - start
+    return report
+
+
+def _context(mesh: Mesh, settings: Settings) -> tuple[Context, list[str]]:
+    """What is known besides the mesh, and what went wrong finding it out, one line each."""
+    medium = settings.medium
+    if medium is None and settings.material is not None:
+        medium = Medium.preset(settings.material, settings.unit or "mm")
+    surroundings = settings.surroundings
+    if surroundings is None:
+        return Context(medium, settings.unit), []
+    neighbours, problems = surroundings.neighbours()
+    opaque = not surroundings.placed.translucent
+    return Context(medium, settings.unit, neighbours, surroundings.pixel_footprint(mesh), opaque), problems
+
+
+def _known_or_checked(mesh: Mesh, context: Context, settings: Settings, path: str | Path) -> MeshReport:
+    """The report on a mesh, from the cache where that is wanted and it is there."""
+    digest = geometry_hash(mesh)
+    report = key = None
+    if settings.cache:
+        from .. import findings_cache
+
+        key = findings_cache.key_of(mesh, digest, context, settings)
+        report = findings_cache.recall(key)
+    if report is None:
+        report = check_mesh(mesh, context, settings, path)
+        if key is not None:
+            findings_cache.keep(key, report)
+    else:
+        report.path, report.cached = str(path), True
+    report.hash = digest
     return report
 
 
@@ -67,10 +114,11 @@ def check_mesh(
     report = MeshReport(str(path or mesh.path or ""), vertices=len(mesh.vertices), faces=len(mesh.faces))
     subject = Subject(mesh, context)
     blocked = None
+    opaque = OPAQUE if subject.context.opaque else None
     # numbers too large or small for double precision are findings, not warnings on the terminal
     with np.errstate(all="ignore"):
         for rule in sorted(all_rules(), key=lambda rule: not rule.on_file):
-            result = _run(rule, subject, settings, None if rule.on_file else blocked)
+            result = _run(rule, subject, settings, None if rule.on_file else blocked or opaque)
             report.rules.append(result)
             if result.outcome == Outcome.FAIL and rule.code in UNUSABLE:
                 blocked = f"{rule.name}: {result.message}"
@@ -80,6 +128,26 @@ def check_mesh(
             _describe(subject, report)
     report.seconds = time.perf_counter() - start
     return report
+
+
+def _repaired(
+    path: str | Path, mesh: Mesh, context: Context, report: MeshReport, settings: Settings
+) -> tuple[MeshReport, Mesh | None]:
+    """The report on the repaired mesh, and that mesh; the one at hand and None where there is no result."""
+    from ..repair.file import repair_file
+
+    place = settings.outputs.get(str(path), str(Path(path).with_suffix(".fixed")))
+    result, repair, failure = repair_file(mesh, place, settings.fix == "unsafe", settings.diff)
+    repair.before["findings"] = {finding.code: finding.count for finding in report.findings}
+    if result is not None:
+        checked = check_mesh(result, context, settings, path)
+        repair.after["findings"] = {finding.code: finding.count for finding in checked.findings}
+        if not settings.diff:
+            report = checked
+    report.repair = repair.to_json()
+    if failure is not None:
+        report.warnings.append(f"{failure.line()}")
+    return report, None if settings.diff else result
 
 
 def report_not_checked(path: str | Path, reason: str, settings: Settings, raised: bool = False) -> MeshReport:

@@ -31,6 +31,12 @@ BAD_FILES = {
 }
 
 
+@pytest.fixture(autouse=True)
+def own_cache(tmp_path_factory, monkeypatch):
+    """No test sees what another, or the user, has checked before."""
+    monkeypatch.setenv("SSS_TOOLS_CACHE", str(tmp_path_factory.mktemp("cache")))
+
+
 @pytest.fixture
 def in_folder(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
@@ -126,27 +132,6 @@ def test_a_folder_is_searched_and_a_list_is_read_from_stdin(in_folder, capsys, m
 @pytest.mark.parametrize(
     "arguments",
     [
-        ["--fix"],
-        ["--unsafe-fixes"],
-        ["--diff"],
-        ["--fix-out", "out"],
-        ["--scheduler", "tcp://here:1"],
-        ["--scene", "scene.toml"],
-        ["--format", "sarif"],
-        ["--format", "github"],
-    ],
-)
-def test_what_comes_later_is_refused_and_not_ignored(in_folder, capsys, arguments):
-    path = write("box.ply", shapes.box())
-    assert main([path, *arguments]) == 2
-    captured = capsys.readouterr()
-    assert "not available in this version" in captured.err and captured.err.count("\n") == 1
-    assert captured.out == "" and listing() == ["box.ply"]
-
-
-@pytest.mark.parametrize(
-    "arguments",
-    [
         [],
         ["box.ply", "--format", "xml"],
         ["box.ply", "--unit", "furlong"],
@@ -160,10 +145,19 @@ def test_what_comes_later_is_refused_and_not_ignored(in_folder, capsys, argument
         ["box.ply", "--jobs", "many"],
         ["box.ply", "--timeout", "-1"],
         ["box.ply", "--timeout", "nan"],
+        ["box.ply", "--waive", "SSS204"],
+        ["box.ply", "--reason", "none"],
+        ["box.ply", "--waive", "SSS204", "--reason", " "],
+        ["box.ply", "--waive", "SSS2", "--reason", "a prefix is no rule"],
+        ["box.ply", "--waive", "SSS702", "--reason", "whatever"],
+        ["box.ply", "--max-memory", "much"],
+        ["box.ply", "--max-memory", "0G"],
+        ["box.ply", "--material", "missing.toml"],
         ["box.ply", "--fix", "--unsafe-fixes"],
         ["box.ply", "-q", "-v"],
         ["--explain", "SSS999"],
         ["scene.toml"],
+        ["box.ply", "--scene", "missing.toml"],
         ["box.ply", "-o", "no/such/folder/report.json"],
         ["box.ply", "-o", "box.ply"],
         ["box.ply", "-o", "./../" + "."],
@@ -296,3 +290,126 @@ def test_corrupt_real_files_are_refused(shared, capsys):
     for mesh in data["meshes"]:
         codes = {rule["code"] for rule in mesh["rules"] if rule["outcome"] == "fail"}
         assert codes & {"SSS602", "SSS701", "SSS702"}, mesh["path"]
+
+
+def test_sarif_and_github_reports_are_written(in_folder, capsys):
+    path = write("box.ply", shapes.inverted(shapes.box()))
+    assert main([path, "--format", "sarif"]) == 1
+    (run,) = json.loads(capsys.readouterr().out)["runs"]
+    assert [result["ruleId"] for result in run["results"]] == ["SSS204"]
+    assert main([path, "--format", "github", "--statistics"]) == 1
+    text = capsys.readouterr().out
+    assert text.startswith("::error file=box.ply,title=SSS204 inverted-shell::") and "       1        1" in text
+
+
+def test_statistics_are_part_of_a_report_for_programs(in_folder, capsys):
+    path = write("box.ply", shapes.inverted(shapes.box()))
+    _, data = run_json(capsys, path, "--statistics")
+    assert [row["code"] for row in data["statistics"]] == ["SSS204"]
+    main([path, "--statistics", "--format", "sarif"])
+    (run,) = json.loads(capsys.readouterr().out)["runs"]
+    assert [row["code"] for row in run["properties"]["statistics"]] == ["SSS204"]
+
+
+def test_a_configuration_file_counts_and_the_command_line_wins(in_folder, capsys):
+    path = write("box.ply", shapes.inverted(shapes.box()))
+    (in_folder / "sss.toml").write_text('ignore = ["SSS204"]\nmaterial = "marble"\nunit = "cm"\n')
+    assert main([path]) == 0
+    assert main([path, "--isolated"]) == 1
+    assert main([path, "--ignore", "SSS101"]) == 1
+    (in_folder / "sss.toml").write_text('severity = { SSS204 = "info", SSS101 = "info" }\njobs = 1\n')
+    assert main([path]) == 0
+    assert main([path, "--severity", "SSS204=error"]) == 1
+    (in_folder / "sss.toml").write_text('per-path-ignores = { "*.ply" = ["SSS2"] }\n')
+    assert main([path, "--ignore", "SSS101"]) == 0
+    (in_folder / "sss.toml").write_text('select = ["SSS1"]\n')
+    assert main([path]) == 0
+    assert main([path, "--select", "SSS2"]) == 1
+
+
+def test_each_mesh_has_the_configuration_nearest_to_it(in_folder, capsys):
+    for name in ("a", "b"):
+        (in_folder / name).mkdir()
+        write(f"{name}/box.ply", shapes.inverted(shapes.box()))
+    (in_folder / "b" / "pyproject.toml").write_text('[tool.sss-check]\nseverity = { SSS204 = "info" }\n')
+    _, data = run_json(capsys, ".")
+    severities = [rule["severity"] for mesh in data["meshes"] for rule in mesh["rules"] if rule["code"] == "SSS204"]
+    assert severities == ["error", "info"]
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["selct = []", 'unit = "furlong"', 'material = "marbel"', "jobs = 0", "= 1", 'material = "missing.toml"'],
+)
+def test_a_bad_configuration_is_one_line_and_status_two(in_folder, capsys, text):
+    write("box.ply", shapes.box())
+    (in_folder / "sss.toml").write_text(text)
+    assert main(["box.ply"]) == 2
+    captured = capsys.readouterr()
+    assert captured.err.startswith("sss-check: error: ") and captured.err.count("\n") == 1
+    assert "sss.toml" in captured.err and captured.out == ""
+
+
+def test_a_scheduler_that_is_not_there_is_one_line_and_status_two(in_folder, capsys, monkeypatch):
+    cluster = pytest.importorskip("sss_tools.cluster")
+    pytest.importorskip("distributed")
+    monkeypatch.setattr(cluster, "CONNECT", 0.5)
+    assert main([write("box.ply", shapes.box()), "--scheduler", "tcp://127.0.0.1:9"]) == 2
+    captured = capsys.readouterr()
+    assert captured.err.startswith("sss-check: error: --scheduler tcp://127.0.0.1:9: ")
+    assert captured.err.count("\n") == 1
+
+
+def test_without_distributed_the_scheduler_option_says_what_to_install(in_folder, capsys, monkeypatch):
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    assert main([write("box.ply", shapes.box()), "--scheduler", "tcp://127.0.0.1:9"]) == 2
+    captured = capsys.readouterr()
+    assert "pip install 'sss-tools[cluster]'" in captured.err and captured.err.count("\n") == 1
+
+
+def test_a_finding_is_waived_with_a_reason_and_stays_so_in_the_record(in_folder, capsys):
+    path = write("box.ply", shapes.inverted(shapes.box()))
+    assert main([path, "--waive", "inverted-shell", "--reason", "by design"]) == 0
+    assert main([path]) == 1, "without a record it holds for one run"
+    assert listing() == ["box.ply"]
+    assert main([path, "--waive", "SSS204", "--reason", "by design", "--record"]) == 0
+    capsys.readouterr()
+    status, data = run_json(capsys, path)
+    (rule,) = (rule for rule in data["meshes"][0]["rules"] if rule["code"] == "SSS204")
+    assert (status, rule["outcome"], rule["reason"]) == (0, "waived", "by design")
+    record = json.loads((in_folder / "box.ply.sss.json").read_text())
+    assert record["waivers"] == [{"code": "SSS204", "reason": "by design"}]
+    # writing the record again keeps them
+    assert main([path, "--record"]) == 0
+    assert json.loads((in_folder / "box.ply.sss.json").read_text())["waivers"] == record["waivers"]
+
+
+def test_a_waiver_is_never_applied_to_other_geometry(in_folder, capsys):
+    path = write("box.ply", shapes.inverted(shapes.box()))
+    main([path, "--waive", "SSS204", "--reason", "by design", "--record"])
+    write("box.ply", shapes.inverted(shapes.box(2.0)))
+    capsys.readouterr()
+    assert main([path]) == 1
+    assert "waivers of SSS204 belong to other geometry and are not applied" in capsys.readouterr().err
+    assert main([path, "--record"]) == 1
+    assert "are dropped" in capsys.readouterr().err
+    assert main([path]) == 1
+    assert capsys.readouterr().err == ""
+
+
+def test_waiving_what_was_not_found_is_a_warning_and_not_recorded(in_folder, capsys):
+    path = write("box.ply", shapes.box())
+    assert main([path, "--waive", "SSS204", "--reason", "by design", "--record"]) == 0
+    assert "nothing to waive: SSS204" in capsys.readouterr().err
+    assert json.loads((in_folder / "box.ply.sss.json").read_text())["waivers"] == []
+
+
+def test_what_was_checked_before_is_not_checked_again(in_folder, capsys):
+    path = write("box.ply", shapes.inverted(shapes.box()))
+    first, second, third = (run_json(capsys, path, *options)[1]["meshes"][0] for options in ((), (), ("--no-cache",)))
+    assert [mesh["cached"] for mesh in (first, second, third)] == [False, True, False]
+    varying = {"seconds", "cached"}
+    for other in (second, third):
+        assert {key: other[key] for key in other.keys() - varying} == {
+            key: first[key] for key in first.keys() - varying
+        }

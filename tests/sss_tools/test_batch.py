@@ -1,11 +1,13 @@
 import os
+import subprocess
 import sys
 import time
+from pathlib import Path
 
 import pytest
 
 from sss_tools import shapes
-from sss_tools.batch import check_files, find_meshes
+from sss_tools.batch import Task, check_files, check_tasks, find_meshes
 from sss_tools.errors import InputError
 from sss_tools.validation.outcome import Outcome
 from sss_tools.validation.settings import Settings
@@ -15,6 +17,8 @@ SABOTAGE = """
 import os, signal, time
 from sss_tools.validation.run import check_file
 
+time.sleep(float(os.environ.get("SABOTAGE_START", 0)))
+
 def check(path, settings):
     name = os.path.basename(path)
     if "kill" in name:
@@ -23,6 +27,8 @@ def check(path, settings):
         signal.signal(signal.SIGSEGV, signal.SIG_DFL)
         os.kill(os.getpid(), signal.SIGSEGV)
     if "hang" in name:
+        with open(path + ".pid", "w") as file:
+            file.write(str(os.getpid()))
         time.sleep(600)
     if "exit" in name:
         os._exit(7)
@@ -30,6 +36,9 @@ def check(path, settings):
         raise KeyError("deep inside")
     if "memory" in name:
         raise MemoryError
+    if "greedy" in name:
+        import numpy
+        numpy.ones(2**27)
     if "noise" in name:
         print("noise on stdout", flush=True)
         os.write(1, b"native noise")
@@ -77,10 +86,71 @@ def test_a_check_that_hangs_is_stopped_and_the_next_mesh_is_checked(tmp_path, sa
     assert time.monotonic() - start < 60
 
 
+@pytest.mark.skipif(os.name != "posix", reason="signals")
+def test_a_worker_does_not_outlive_the_command_that_is_killed(tmp_path, sabotage):
+    (path,) = boxes(tmp_path, "hang")
+    code = (
+        "import sys; from sabotaged_check import check; from sss_tools.batch import check_files;"
+        "from sss_tools.validation.settings import Settings; check_files([sys.argv[1]], Settings(), check=check)"
+    )
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(entry or "." for entry in sys.path)}
+    command = subprocess.Popen([sys.executable, "-c", code, path], env=environment)
+    note = Path(path + ".pid")
+    assert eventually(lambda: note.exists() and note.read_text())
+    worker = int(note.read_text())
+    assert is_running(worker)
+    command.kill()
+    command.wait()
+    assert eventually(lambda: not is_running(worker))
+
+
+def eventually(condition, seconds=60.0):
+    end = time.monotonic() + seconds
+    while not (holds := condition()) and time.monotonic() < end:
+        time.sleep(0.05)
+    return holds
+
+
+def is_running(process):
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return False
+    # an orphan that nobody has asked about is dead, too
+    state = Path(f"/proc/{process}/stat")
+    return not (state.exists() and state.read_text().rsplit(")", 1)[1].split()[0] == "Z")
+
+
 def test_an_error_of_the_check_itself_is_status_two_and_running_out_of_memory_is_not(tmp_path, sabotage):
     faulty, large = check_files(boxes(tmp_path, "raise", "memory"), Settings(), jobs=1, check=sabotage)
     assert "KeyError" in faulty.error and faulty.exit_status == 2
     assert "out of memory" in large.error and large.exit_status == 0
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="other systems do not keep limits of data")
+def test_a_mesh_that_takes_more_memory_than_allowed_is_not_run_and_the_next_is_checked(tmp_path, sabotage):
+    greedy, sound = boxes(tmp_path, "greedy", "b")
+    # the array takes 1 GiB
+    (allowed,) = check_files([greedy], Settings(), check=sabotage)
+    assert allowed.status == "ok"
+    refused, checked = check_files([greedy, sound], Settings(), jobs=1, check=sabotage, max_memory=2**30)
+    assert "out of memory: it needs more than 1 GiB" in refused.error and refused.exit_status == 0
+    assert {rule.outcome for rule in refused.rules} == {Outcome.NOT_RUN}
+    assert checked.status == "ok"
+
+
+def test_the_time_a_worker_takes_to_start_is_not_the_meshs(tmp_path, sabotage, monkeypatch):
+    monkeypatch.setenv("SABOTAGE_START", "7")
+    (report,) = check_files(boxes(tmp_path, "a"), Settings(), timeout=6, check=sabotage)
+    assert report.status == "ok"
+
+
+def test_the_reports_of_many_meshes_wait_on_disk(tmp_path):
+    reports = check_tasks([Task(path, Settings()) for path in boxes(tmp_path, "a", "b")])
+    assert not isinstance(reports, list)
+    assert [Path(report.path).name for report in reports] == ["a.ply", "b.ply"]
+    # each access reads it anew
+    assert reports[0] is not reports[0] and reports[0] == reports[0]
 
 
 def test_nothing_a_worker_prints_reaches_stdout(tmp_path, sabotage, capfd):

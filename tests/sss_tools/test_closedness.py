@@ -30,7 +30,7 @@ def split_along_a_seam(mesh):
 
 def test_a_box_is_closed_and_strict():
     verdict = assess(shapes.box(2.0)).closedness
-    assert verdict == Closedness("closed", True, True, True, False, None, 0, (), 0.0, "strict")
+    assert verdict == Closedness("closed", True, True, True, False, False, 0, (), 0.0, "strict")
 
 
 def test_a_box_of_separate_triangles_with_equal_corners_is_closed():

@@ -6,8 +6,9 @@ import pytest
 
 from sss_tools import shapes
 from sss_tools.closedness import assess
+from sss_tools.medium import Medium
 from sss_tools.mesh import Mesh
-from sss_tools.record import RecordWarning, geometry_hash, read_record, record_path, write_record
+from sss_tools.record import RecordWarning, geometry_hash, read_record, read_waivers, record_path, write_record
 from sss_tools.validation.run import check_mesh
 
 
@@ -15,7 +16,9 @@ from sss_tools.validation.run import check_mesh
 def recorded(tmp_path):
     mesh = shapes.punctured(shapes.icosphere(), [[0, 0, 1]], 0.3)
     path = tmp_path / "ball.ply"
-    write_record(path, mesh, check_mesh(mesh), "marble")
+    repairs = [{"name": "weld", "status": "applied"}]
+    medium = Medium.preset("marble", "cm")
+    write_record(path, mesh, check_mesh(mesh), "marble", medium, "cm", {"SSS101": "seen"}, repairs)
     return path, mesh
 
 
@@ -29,6 +32,31 @@ def test_a_record_lies_beside_its_mesh_and_says_what_was_found(recorded):
     assert record.material == "marble"
     assert [finding["code"] for finding in record.findings] == ["SSS101"]
     assert [part["role"] for part in record.components] == ["solid"]
+    assert record.waivers == {"SSS101": "seen"}
+    assert record.repairs == [{"name": "weld", "status": "applied"}]
+
+
+def test_a_record_holds_all_that_was_promised(recorded):
+    path, _ = recorded
+    data = json.loads(record_path(path).read_text())
+    assert set(data) == {
+        *("schema", "hash", "rules", "material", "medium", "unit"),
+        *("closedness", "components", "findings", "waivers", "repairs"),
+    }
+    assert data["medium"]["sigma_s"] == Medium.preset("marble", "cm").sigma_s.tolist()
+
+
+def test_waivers_outlive_the_rules_but_not_the_geometry(recorded):
+    path, mesh = recorded
+    sidecar = record_path(path)
+    sidecar.write_text(json.dumps({**json.loads(sidecar.read_text()), "rules": "0"}))
+    assert read_waivers(path, geometry_hash(mesh)) == ({"SSS101": "seen"}, [])
+    assert read_waivers(path, "blake2b:other") == ({}, ["SSS101"])
+    sidecar.write_text(json.dumps({**json.loads(sidecar.read_text()), "waivers": [{"code": "SSS101"}]}))
+    with pytest.raises(ValueError, match="incomplete"):
+        read_waivers(path, geometry_hash(mesh))
+    sidecar.unlink()
+    assert read_waivers(path, geometry_hash(mesh)) == ({}, [])
 
 
 def test_no_record_is_no_warning(tmp_path):
@@ -55,6 +83,7 @@ def test_a_record_of_other_geometry_is_ignored_with_a_warning(recorded):
         (lambda data: {**data, "hash": None}, "other geometry"),
         (lambda data: {**data, "closedness": {}}, "incomplete"),
         (lambda data: {key: data[key] for key in data if key != "findings"}, "incomplete"),
+        (lambda data: {key: data[key] for key in data if key != "waivers"}, "incomplete"),
         (lambda data: [data], "schema"),
     ],
 )

@@ -1,7 +1,8 @@
 import numpy as np
 import pytest
 
-from renderer.optics.table_cache import FOLDER_VARIABLE, cache_folder, cached
+from renderer.optics.table_cache import cached
+from sss_tools.cache import FOLDER_VARIABLE
 
 
 @pytest.fixture
@@ -63,8 +64,3 @@ def test_an_unwritable_folder_is_no_error(tmp_path, monkeypatch):
     assert cached("table", "key", (2, 3), compute).shape == (2, 3)
     assert cached("table", "key", (2, 3), compute).shape == (2, 3)
     assert compute.calls == 2
-
-
-def test_without_the_variable_it_is_the_users_cache_folder(monkeypatch):
-    monkeypatch.delenv(FOLDER_VARIABLE, raising=False)
-    assert "sss-tools" in str(cache_folder())

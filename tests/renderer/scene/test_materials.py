@@ -5,9 +5,9 @@ from pathlib import Path
 import pytest
 from numpy.testing import assert_allclose
 
-from renderer.scene.keys import Place
 from renderer.scene.materials import read_material
 from sss_tools.errors import InputError
+from sss_tools.keys import Place
 from sss_tools.medium import Medium
 
 PLACE = Place(Path("scene.toml"), "[material.wax]")

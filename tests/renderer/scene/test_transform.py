@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from renderer.scene.keys import Place
 from renderer.scene.transform import read_transform, rotation, transformed
 from sss_tools.errors import InputError
+from sss_tools.keys import Place
 from sss_tools.mesh import Mesh
 
 PLACE = Place(Path("scene.toml"), '"transform" of [[object]] 1')

@@ -98,7 +98,6 @@ def test_a_sound_solid_has_no_finding_at_any_scale_and_place(mesh):
 def test_rules_not_built_yet_are_not_run_with_their_reason():
     reasons = {rule.code: rule.reason for rule in check_mesh(shapes.box()).rules if rule.outcome == "not-run"}
     assert reasons == {
-        "SSS302": "not available in this version",
         "SSS304": "no scene",
         "SSS404": "no scene",
         "SSS501": "no material",
@@ -197,8 +196,52 @@ def test_internal_geometry_finds_a_nested_solid():
 
 def test_internal_geometry_finds_overlapping_solids_but_not_near_ones():
     ball = shapes.icosphere()
-    assert found(shapes.joined(ball, shapes.moved(ball, [1.5, 0, 0]))) == {"SSS301": 2}
+    overlapping = shapes.joined(ball, shapes.moved(ball, [1.5, 0, 0]))
+    assert found(overlapping) == {"SSS301": 2, "SSS302": 180}
+    # the cap of each ball in the other, up to the plane half way between them
+    result = run(overlapping, "SSS301")
+    height = np.abs(overlapping.vertices[overlapping.faces][..., 0] - 0.75).max(axis=1)
+    deep = overlapping.vertices[overlapping.faces].mean(axis=1)
+    inside = np.where(np.arange(len(height)) < len(ball.faces), deep[:, 0] > 0.85, deep[:, 0] < 0.65)
+    assert set(np.flatnonzero(inside)) <= set(result.faces)
+    assert "2 patches with solid on both sides" in result.message
     assert found(shapes.joined(ball, shapes.moved(ball, [2.001, 0, 0]))) == {}
+
+
+def test_internal_geometry_finds_solids_that_overlap_with_a_few_large_faces():
+    """Every face near the overlap is cut: there is no patch inside, only faces that reach in."""
+    boxes = shapes.joined(shapes.box(), shapes.moved(shapes.box(), [0.7, 0.6, 0.8]))
+    result = run(boxes, "SSS301")
+    assert result.count == 2 and "2 components reaching into a solid" in result.message
+    assert len(result.faces) >= 2 and run(boxes, "SSS302").outcome == Outcome.FAIL
+
+
+def test_internal_geometry_is_found_inside_a_solid_with_holes():
+    holed = shapes.punctured(shapes.icosphere(1.0, 4), [[0, 0, 1]], 0.2)
+    result = run(shapes.with_internal(holed, [0, 0, -0.2], 0.3), "SSS301")
+    assert result.count == 1 and min(result.faces) == len(holed.faces)
+    cavity = shapes.joined(holed, shapes.inverted(shapes.icosphere(0.3)))
+    assert run(cavity, "SSS301").outcome == Outcome.PASS and run(cavity, "SSS305").count == 1
+
+
+def test_a_solid_that_passes_through_itself_at_large_has_internal_geometry_and_a_small_fold_has_not():
+    ring = shapes.torus(1.0, 0.15)
+    x, y, z = ring.vertices.T
+    angle, beside = np.arctan2(y, x), np.hypot(x, y) - 1
+    # the ring laid in a figure of eight, which passes through itself where it crosses
+    middle = np.stack([1.5 * np.sin(angle), np.sin(2 * angle), z], axis=1)
+    along = np.stack([1.5 * np.cos(angle), 2 * np.cos(2 * angle)])
+    along /= np.linalg.norm(along, axis=0)
+    eight = Mesh(middle + np.stack([beside * along[1], -beside * along[0], 0 * z], axis=1), ring.faces)
+    assert run(eight, "SSS302").outcome == run(eight, "SSS301").outcome == Outcome.FAIL
+    inner = eight.vertices[eight.faces[run(eight, "SSS301").faces]].mean(axis=1)
+    assert np.linalg.norm(inner, axis=1).max() < 1
+    ball = shapes.icosphere(1.0, 4)
+    poked = ball.vertices.copy()
+    near = np.argsort(np.linalg.norm(poked - [0, 0, 1], axis=1))
+    poked[near[0]] = poked[near[1]] + 1.2 * (poked[near[1]] - poked[near[0]]) - [0, 0, 0.02]
+    folded = Mesh(poked, ball.faces)
+    assert run(folded, "SSS302").outcome == Outcome.FAIL and run(folded, "SSS301").outcome == Outcome.PASS
 
 
 def test_internal_geometry_finds_a_wall_between_boxes():
@@ -317,10 +360,10 @@ def test_the_far_vase_and_no_other_clean_mesh_loses_its_vertices(shared):
         ("derived_inverted_vase.stl", {"SSS204": 1}),
         ("admesh_block_normal-directions-bad.stl", {"SSS203": 3}),
         ("shared.STL", {"SSS201": 1}),
-        ("cow.obj", {"SSS202": 1}),
+        ("cow.obj", {"SSS202": 1, "SSS302": 85}),
         ("joined_tetrahedra.obj", {"SSS201": 3, "SSS301": 2, "SSS303": 1}),
-        ("wallhole.obj", {"SSS201": 1, "SSS303": 1, "SSS401": 11}),
-        ("beetle_vw.obj", {"SSS102": 2, "SSS201": 47}),
+        ("wallhole.obj", {"SSS201": 1, "SSS302": 50, "SSS303": 1, "SSS401": 11}),
+        ("beetle_vw.obj", {"SSS102": 2, "SSS201": 47, "SSS302": 59}),
     ],
 )
 def test_real_meshes_have_the_findings_that_other_tools_count(shared, name, expected):

@@ -130,7 +130,7 @@ def test_an_unwritable_record_is_a_warning(tmp_path, monkeypatch):
     path = tmp_path / "box.ply"
     write_mesh(shapes.box(), path)
 
-    def refuse(*_):
+    def refuse(*_, **__):
         raise PermissionError(13, "Permission denied")
 
     monkeypatch.setattr(run_module, "write_record", refuse)

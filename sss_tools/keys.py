@@ -1,7 +1,7 @@
 """Reading tables by description: what each key may hold, and one clear line where it holds something else.
 
 A ``Kind`` says what a value may be, a ``Key`` adds the default, ``read_keys`` turns a TOML table into values.
-Nothing here knows what a scene is.
+Nothing here knows what a scene or a configuration is.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sss_tools.errors import InputError
+from .errors import InputError
 
 REQUIRED = object()
 """The default of keys that have none."""

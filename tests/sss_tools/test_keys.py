@@ -4,7 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from renderer.scene.keys import (
+from sss_tools.errors import InputError
+from sss_tools.keys import (
     Key,
     Kind,
     Place,
@@ -17,7 +18,6 @@ from renderer.scene.keys import (
     to_text,
     to_whole_numbers,
 )
-from sss_tools.errors import InputError
 
 PLACE = Place(Path("a.toml"), "[thing]")
 NUMBER = Key(Kind("a number", to_number))

@@ -1,0 +1,105 @@
+"""The same checks on the workers of a Dask cluster.
+
+Every Dask worker keeps a process of its own for the meshes it is given (``worker``): time and memory limits hold
+there as they do here, and a mesh that crashes a native library costs the cluster nothing. Meshes travel by
+path: the workers must see the same files under the same names.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import multiprocessing
+import threading
+from collections.abc import Generator, Iterator, Sequence
+from itertools import islice
+from pathlib import Path
+
+from .errors import InputError
+from .validation.outcome import MeshReport
+from .worker import Check, Task, Worker
+
+CONNECT = 10.0
+"""Seconds to wait for the scheduler to answer."""
+
+AHEAD = 4
+"""Meshes handed out for each thread of the cluster: enough that none waits, few enough to keep nothing piled up."""
+
+_local = threading.local()
+
+
+def results_of_cluster(
+    tasks: Sequence[Task], address: str, check: Check | None = None
+) -> Generator[tuple[int, MeshReport], None, None]:
+    """The reports and the number of their task, as they come in from the cluster at ``address``.
+
+    A Dask worker that dies has its meshes checked by another; one that does so again and again makes its mesh
+    ``not-run``. Raises InputError where distributed is not installed or no scheduler answers.
+    """
+    try:
+        from distributed import Client, as_completed
+    except ImportError as error:
+        raise InputError(
+            "--scheduler", f"needs the package {error.name}", "install it: pip install 'sss-tools[cluster]'"
+        ) from error
+    try:
+        client = Client(address, timeout=CONNECT, set_as_default=False)
+    except (OSError, ValueError, TypeError) as error:
+        raise InputError(
+            f"--scheduler {address}", "no Dask scheduler answers there", "use for example tcp://HOST:8786"
+        ) from error
+    with client:
+        folder = str(Path.cwd())
+        numbers = {}
+
+        def submit(entry: tuple[int, Task]):
+            future = client.submit(_check_on_worker, entry[1], check, folder, pure=False)
+            numbers[future.key] = entry[0]
+            return future
+
+        waiting = enumerate(tasks)
+        ahead = AHEAD * max(sum(client.nthreads().values()), 1)
+        completed = as_completed([submit(entry) for entry in islice(waiting, ahead)], loop=client.loop)
+        for future in completed:
+            number = numbers.pop(future.key)
+            yield number, _report(future, tasks[number])
+            for entry in islice(waiting, 1):
+                completed.add(submit(entry))
+
+
+def _report(future, task: Task) -> MeshReport:
+    """What came of a task."""
+    error = future.exception()
+    if error is None:
+        return future.result()
+    from .validation.run import report_not_checked
+
+    # KilledWorker, a lost scheduler, an environment without this package: the mesh was not looked at
+    reason = f"the cluster could not check it ({type(error).__name__}: {error})"
+    return report_not_checked(task.path, reason, task.settings)
+
+
+def _check_on_worker(task: Task, check: Check | None, folder: str) -> MeshReport:
+    """What a thread of a Dask worker does."""
+    arguments = (check, folder)
+    if getattr(_local, "arguments", None) != arguments:
+        if hasattr(_local, "worker"):
+            _local.worker.stop()
+        _local.worker, _local.arguments = Worker(*arguments), arguments
+    with _children_allowed():
+        return _local.worker.run(task)
+
+
+@contextlib.contextmanager
+def _children_allowed() -> Iterator[None]:
+    """Let a daemon process start another.
+
+    Dask's workers are daemons, and multiprocessing forbids those to have children, lest they outlive them.
+    Ours end by themselves with the process that started them.
+    """
+    configuration = getattr(multiprocessing.current_process(), "_config", {})
+    daemon = configuration.pop("daemon", None)
+    try:
+        yield
+    finally:
+        if daemon is not None:
+            configuration["daemon"] = daemon
