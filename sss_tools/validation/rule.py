@@ -7,7 +7,6 @@ import pkgutil
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
-from typing import NoReturn
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -24,15 +23,31 @@ class NotRun(Exception):
 
 
 @dataclass(frozen=True)
+class Neighbour:
+    """Another translucent object of the scene that a mesh stands in.
+
+    name  what the scene calls it
+    mesh  in the frame and unit of the mesh under examination
+    """
+
+    name: str
+    mesh: Mesh
+
+
+@dataclass(frozen=True)
 class Context:
     """What the command knows besides the mesh.
 
     medium  what the mesh is made of, coefficients per mesh unit; None where no material was named
     unit    what one mesh unit is: mm, cm, m, inch; None where it was not said
+    neighbours  the other translucent objects of the scene; None where there is no scene
+    extent  longest side of the whole scene, mesh units; None takes that of the mesh and its neighbours
     """
 
     medium: Medium | None = None
     unit: str | None = None
+    neighbours: tuple[Neighbour, ...] | None = None
+    extent: float | None = None
 
 
 class Subject:
@@ -126,13 +141,3 @@ def all_rules() -> tuple[Rule, ...]:
 def plural(count: int, noun: str, nouns: str | None = None) -> str:
     """``1 hole``, ``2 holes``."""
     return f"{count} {noun if count == 1 else nouns or noun + 's'}"
-
-
-def without_scene(subject: Subject) -> NoReturn:
-    """The check of a rule that needs a scene, in a version that gives it none."""
-    raise NotRun("no scene")
-
-
-def without_engine(subject: Subject) -> NoReturn:
-    """The check of a rule that this version does not have yet."""
-    raise NotRun("not available in this version")
