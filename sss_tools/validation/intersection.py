@@ -4,8 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..contact import common_faces, lies_within, near_faces
+from ..rays import RAY_OFFSET
 from .outcome import FixSafety, Severity
-from .rule import Finding, Rule, Subject, plural, without_scene
+from .rule import Finding, Neighbour, NotRun, Rule, Subject, plural
+
+RESOLVED = 2 * float(RAY_OFFSET)
+"""Least gap that rays tell from none, over the longest side of the scene: a ray starts one offset off its face, and
+may end as far off the next."""
 
 
 def find_self_intersections(subject: Subject) -> Finding | None:
@@ -21,6 +27,78 @@ def find_self_intersections(subject: Subject) -> Finding | None:
         faces=faces,
         face_pairs=pairs,
     )
+
+
+def find_overlaps(subject: Subject) -> Finding | None:
+    """Neighbours in the scene that the mesh interpenetrates or touches."""
+    neighbours = _neighbours(subject)
+    _refuse_what_bounds_nothing(subject)
+    faces, names = [], []
+    for neighbour in neighbours:
+        if not _within(subject, neighbour, 0.0):
+            continue
+        common = common_faces(subject.mesh, neighbour.mesh)
+        if len(common) == 0 and lies_within(subject.mesh, neighbour.mesh):
+            common = np.arange(len(subject.mesh.faces))
+        if len(common) or lies_within(neighbour.mesh, subject.mesh):
+            faces.append(common)
+            names.append(neighbour.name)
+    if not names:
+        return None
+    return Finding(
+        count=len(names),
+        message=f"overlaps or touches {', '.join(names)} (exact, no tolerance)",
+        faces=np.unique(np.concatenate(faces)),
+    )
+
+
+def find_near_contacts(subject: Subject) -> Finding | None:
+    """Neighbours in the scene across a gap that rays do not resolve."""
+    neighbours = _neighbours(subject)
+    extent = subject.context.extent or _extent(subject, neighbours)
+    least = RESOLVED * extent
+    faces, found = [], []
+    for neighbour in neighbours:
+        if not _within(subject, neighbour, least):
+            continue
+        near, gap = near_faces(subject.mesh, neighbour.mesh, least)
+        # what touches is SSS304's
+        if len(near) and gap > 0:
+            faces.append(near)
+            found.append(f"{gap:.3g} to {neighbour.name}")
+    if not found:
+        return None
+    unit = subject.context.unit or "units"
+    return Finding(
+        count=len(found),
+        message=f"gaps of {', '.join(found)}, where rays need {least:.3g} {unit} "
+        f"({RESOLVED:g} of the scene's longest side)",
+        faces=np.unique(np.concatenate(faces)),
+    )
+
+
+def _neighbours(subject: Subject) -> tuple[Neighbour, ...]:
+    if subject.context.neighbours is None:
+        raise NotRun("no scene")
+    return tuple(
+        neighbour for neighbour in subject.context.neighbours if neighbour.translucent and len(neighbour.mesh.faces)
+    )
+
+
+def _refuse_what_bounds_nothing(subject: Subject) -> None:
+    if subject.assessment.closedness.state == "open":
+        raise NotRun("the mesh encloses no volume")
+
+
+def _within(subject: Subject, neighbour: Neighbour, distance: float) -> bool:
+    """Whether the boxes of the two come within ``distance`` of each other along every axis."""
+    (lower, upper), (low, high) = subject.mesh.bounds, neighbour.mesh.bounds
+    return bool(((lower - distance <= high) & (low - distance <= upper)).all())
+
+
+def _extent(subject: Subject, neighbours: tuple[Neighbour, ...]) -> float:
+    bounds = np.array([subject.mesh.bounds, *(neighbour.mesh.bounds for neighbour in neighbours)])
+    return float((bounds[:, 1].max(axis=0) - bounds[:, 0].min(axis=0)).max())
 
 
 SELF_INTERSECTION = Rule(
@@ -43,7 +121,7 @@ OVERLAPPING_SOLIDS = Rule(
     why="Two media in one place have no right answer: what light does there depends on which object is listed first.",
     fix="move them apart, or cut one from the other",
     fix_safety=FixSafety.UNSAFE,
-    check=without_scene,
+    check=find_overlaps,
 )
 
 NEAR_CONTACT = Rule(
@@ -54,5 +132,5 @@ NEAR_CONTACT = Rule(
     why="A ray that leaves one object starts inside the next and never meets its boundary.",
     fix="widen the gap, or let the objects overlap on purpose",
     fix_safety=FixSafety.NONE,
-    check=without_scene,
+    check=find_near_contacts,
 )

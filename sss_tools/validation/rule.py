@@ -7,7 +7,6 @@ import pkgutil
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
-from typing import NoReturn
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -45,6 +44,7 @@ class Context:
     pixel_footprint  width in mesh units of what a pixel covers where the mesh is nearest to the camera; None
                      without a scene, and where the mesh is behind the camera
     opaque           the scene gives the mesh a material that light does not enter
+    extent           longest side of the whole scene, mesh units; None takes that of the mesh and its neighbours
     """
 
     medium: Medium | None = None
@@ -52,6 +52,7 @@ class Context:
     neighbours: tuple[Neighbour, ...] | None = None
     pixel_footprint: float | None = None
     opaque: bool = False
+    extent: float | None = None
 
 
 class Subject:
@@ -145,13 +146,3 @@ def all_rules() -> tuple[Rule, ...]:
 def plural(count: int, noun: str, nouns: str | None = None) -> str:
     """``1 hole``, ``2 holes``."""
     return f"{count} {noun if count == 1 else nouns or noun + 's'}"
-
-
-def without_scene(subject: Subject) -> NoReturn:
-    """The check of a rule that needs a scene, in a version that gives it none."""
-    raise NotRun("no scene")
-
-
-def without_engine(subject: Subject) -> NoReturn:
-    """The check of a rule that this version does not have yet."""
-    raise NotRun("not available in this version")

@@ -221,11 +221,13 @@ def test_a_record_is_written_on_request_alone(in_folder, capsys):
     assert (record["schema"], record["material"]) == ("sss-record/1", "marble")
 
 
-def test_with_a_material_the_rules_of_scale_say_that_they_are_missing(in_folder, capsys):
-    path = write("box.ply", shapes.box())
-    _, data = run_json(capsys, path, "--material", "skin1", "--unit", "cm")
-    reasons = {rule["code"]: rule["reason"] for rule in data["meshes"][0]["rules"]}
-    assert reasons["SSS501"] == reasons["SSS502"] == "not available in this version"
+def test_a_material_and_a_unit_decide_on_scale(in_folder, capsys):
+    path = write("box.ply", shapes.box(0.5))
+    for unit, thin, mismatch in (("mm", "fail", "fail"), ("cm", "pass", "pass")):
+        _, data = run_json(capsys, path, "--material", "skin1", "--unit", unit)
+        outcomes = {rule["code"]: rule["outcome"] for rule in data["meshes"][0]["rules"]}
+        # light of the channel that gets least far goes 0.67 mm
+        assert (outcomes["SSS501"], outcomes["SSS502"]) == (thin, mismatch)
 
 
 def test_explain_tells_all_about_a_rule(capsys):
