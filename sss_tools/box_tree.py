@@ -21,6 +21,8 @@ Result = TypeVar("Result")
 BLOCK = 1 << 14
 """Pairs looked at together: their temporaries stay in the second-level cache."""
 
+_ALL_TRUE = np.ones(8, bool).view(np.uint64)[0]
+
 ODD_SIZE = 8.0
 """Boxes this many times larger than the median stand apart in the tree, lest they blow up the nodes of small ones."""
 
@@ -40,15 +42,20 @@ class BoxTree:
         self.order = _places(lower, upper, group)
         count = len(self.order)
         depth = max(int(count - 1).bit_length(), 0)
-        level = np.full((6, 1 << depth), np.inf, np.float32)
-        # the negated upper corner, so that one minimum serves both
-        level[:3, :count] = lower[self.order].T
-        level[3:, :count] = -upper[self.order].T
+        # a box a row of 32 bytes, which numpy gathers fastest: lower corner, negated upper corner, two zeros.
+        # Negated, so that one minimum serves both
+        level = np.full((1 << depth, 8), np.inf, np.float32)
+        level[:count, :3] = lower.take(self.order, axis=0)
+        level[:count, 3:6] = -upper.take(self.order, axis=0)
+        level[:, 6:] = 0
         self._levels = [level]
-        while level.shape[1] > 1:
-            level = np.minimum(level[:, 0::2], level[:, 1::2])
+        while len(level) > 1:
+            level = np.minimum(level[0::2], level[1::2])
             self._levels.append(level)
         self._levels.reverse()
+        # the other way round: what the rows of a box that overlaps do not exceed. numpy would copy all of an array
+        # that is not contiguous each time it takes a few rows
+        self._limits = [-np.ascontiguousarray(level[:, [3, 4, 5, 0, 1, 2, 6, 7]]) for level in self._levels]
         self._groups = None if group is None else _pure_groups(group[self.order], depth)
 
     def for_each_block(self, visit: Callable[[Indices, Indices], Result]) -> list[Result]:
@@ -60,7 +67,7 @@ class BoxTree:
         blocks: list[tuple[int, Indices, Indices]] = []
         first, second = np.zeros(0, np.int32), np.zeros(0, np.int32)
         for level in range(1, last + 1):
-            left = np.arange(0, self._levels[level].shape[1], 2, dtype=np.int32)
+            left = np.arange(0, len(self._levels[level]), 2, dtype=np.int32)
             first, second = np.concatenate([first, left]), np.concatenate([second, left + 1])
             first, second = self._overlapping(level, first, second)
             if level == last or len(first) > 4 * BLOCK:
@@ -91,13 +98,10 @@ class BoxTree:
     def _overlapping(self, level: int, a: Indices, b: Indices) -> tuple[Indices, Indices]:
         """Those of the pairs of nodes whose boxes overlap."""
         a, b = self._of_interest(level, a, b)
-        boxes = self._levels[level]
-        hit = boxes[0].take(a) <= -boxes[3].take(b)
-        hit &= boxes[0].take(b) <= -boxes[3].take(a)
-        for axis in (1, 2):
-            hit &= boxes[axis].take(a) <= -boxes[axis + 3].take(b)
-            hit &= boxes[axis].take(b) <= -boxes[axis + 3].take(a)
-        return a[hit], b[hit]
+        within = self._levels[level].take(a, axis=0) <= self._limits[level].take(b, axis=0)
+        # eight truths at once
+        hit = np.flatnonzero(within.view(np.uint64)[:, 0] == _ALL_TRUE)
+        return a.take(hit), b.take(hit)
 
     def _of_interest(self, level: int, a: Indices, b: Indices) -> tuple[Indices, Indices]:
         """Those of the pairs of nodes that do not belong to one group."""
@@ -138,8 +142,9 @@ def _places(lower, upper, group) -> NDArray[np.int64]:
     """
     if len(lower) == 0:
         return np.zeros(0, np.int64)
-    key = morton_keys(((lower + upper) / 2).T, 14)
-    size = (upper - lower).max(axis=1)
+    key = morton_keys(np.ascontiguousarray((lower.T + upper.T) / 2), 14)
+    extent = upper.T - lower.T
+    size = np.maximum(np.maximum(extent[0], extent[1]), extent[2])
     median = float(np.median(size))
     if median > 0 and size.max() > ODD_SIZE * median:
         odd = np.clip(np.ceil(np.log2(np.maximum(size / (ODD_SIZE * median), 1)) / 2), 0, 7)

@@ -64,7 +64,9 @@ class _Search:
         self.spread = _spreads_out(topology, self.centred, measures, inner)
 
         chosen = np.flatnonzero(takes_part)
-        lower, upper = corners.min(axis=0)[:, chosen].T, corners.max(axis=0)[:, chosen].T
+        # pairwise, as reducing three rows is several times slower
+        lower = np.minimum(np.minimum(corners[0], corners[1]), corners[2])[:, chosen].T
+        upper = np.maximum(np.maximum(corners[0], corners[1]), corners[2])[:, chosen].T
         self.tree = BoxTree(lower, upper, part[chosen])
         self.face = chosen[self.tree.order]
         self.points = np.ascontiguousarray(topology.faces[self.face].T, np.int32)
@@ -151,10 +153,11 @@ def _centred(points, faces):
     """(3, k) moved to the middle of what ``faces`` use and scaled to at most 1 by a power of two: rounds once."""
     used = np.zeros(len(points), bool)
     used[faces] = True
-    lower, upper = (bound(points[used] / 2, axis=0) for bound in (np.min, np.max))
+    places = np.ascontiguousarray(points.T)
+    lower, upper = (bound(places[:, used], axis=1, keepdims=True) / 2 for bound in (np.min, np.max))
     exponent = int(np.frexp((upper - lower).max())[1])
     half = -exponent // 2
-    return np.ascontiguousarray((points - (lower + upper)).T * 2.0**half * 2.0 ** (-exponent - half))
+    return (places - (lower + upper)) * 2.0**half * 2.0 ** (-exponent - half)
 
 
 def _spreads_out(topology: Topology, centred, measures: _Measures, known):

@@ -99,6 +99,19 @@ def test_a_fold_back_onto_a_neighbour_is_found():
     assert pairs(Mesh(points, [[0, 1, 2], [1, 0, 4]])) == set()
 
 
+def test_a_fan_that_turns_twice_round_its_corner_meets_itself_there():
+    turns = np.arange(12) * np.pi / 3
+    for around, expected in ((2, True), (1, False)):
+        angle = turns * around / 2
+        # the second turn crosses the first half way; a single turn only rises and falls
+        rim = np.stack([np.cos(angle), np.sin(angle), 0.1 * np.cos(angle / 2)], axis=1)
+        rim[:, :2] *= np.linspace(1.0, 1.3, 12)[:, None]
+        fan = np.stack([np.zeros(12, int), 1 + np.arange(12), 1 + (np.arange(12) + 1) % 12], axis=1)
+        mesh = Mesh(np.concatenate([[[0, 0, 0]], rim]), fan)
+        assert (pairs(mesh) != set()) == expected
+        assert pairs(mesh) == slowly(mesh.vertices, mesh.faces)
+
+
 def test_a_corner_that_pokes_through_a_neighbour_at_another_corner_is_found():
     points = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0.2, 0.2, 0.5], [0.2, 0.2, -0.5]])
     assert pairs(Mesh(points, [[0, 1, 2], [0, 3, 4]])) == {(0, 1)}
