@@ -8,7 +8,7 @@ from renderer.optics import ball, lookup
 from renderer.optics.ball import ball_coefficients, ball_profile, ball_table, bessel_quotients
 from renderer.optics.dielectric import fresnel_reflectance
 from renderer.optics.slab import diffusion, slab_reflectance, slab_transmittance
-from renderer.optics.table_cache import FOLDER_VARIABLE
+from sss_tools.cache import FOLDER_VARIABLE
 
 BIN_CENTRES = (np.arange(2000) + 0.5) / 1000 - 1
 """100 cosines in each of the 20 bins of the reference."""

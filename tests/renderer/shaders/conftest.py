@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from renderer.optics.ball import ball_table
-from renderer.optics.table_cache import FOLDER_VARIABLE
 from renderer.shaders.surface import SurfacePoints
+from sss_tools.cache import FOLDER_VARIABLE
 from sss_tools.rays import RayCaster
 
 
