@@ -10,7 +10,7 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from hashlib import blake2b
-from threading import local
+from queue import Empty, SimpleQueue
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +25,7 @@ from .shaders import FAST_SHADERS, diffuse, selection
 from .shaders.fast_body import FastBody
 from .shaders.selection import DEFAULT_QUALITY, Plan
 from .shaders.surface import BodyOptics
+from .tracing.memory import keep_freed_memory
 from .tracing.tally import Tally
 from .tracing.traced_scene import TracedObject, TracedScene
 from .wavefront import Samples, Wavefront
@@ -86,6 +87,7 @@ class Renderer:
             checked, self.sources = admit(scene)
         self.plans = selection.select(checked, settings.quality, settings.shader, settings.hole_handling, passes)
         self.scene = checked
+        keep_freed_memory()
         with self.stages.stage("build"):
             self.traced = TracedScene(
                 self.scene, [plan.shader for plan in self.plans], [plan.hole_handling for plan in self.plans]
@@ -94,7 +96,8 @@ class Renderer:
             self._fast_bodies = _fast_bodies(self.traced)
             self.shader_id, self.object_id = self._identify()
         self.film = Film.blank(scene.camera.resolution, planned_hash(scene, self.plans), settings.seed)
-        self._worker = local()
+        # their buffers outlive the threads of one ``run``
+        self._idle: SimpleQueue[Wavefront] = SimpleQueue()
 
     def run(self, passes: Iterable[int], done: Callable[[int], bool] | None = None) -> None:
         """Add passes to the film, in the order given.
@@ -136,11 +139,14 @@ class Renderer:
         return Picture(self.film, seconds, self.shader_id, self.object_id, aovs or {})
 
     def _trace(self, index: int, first: int, last: int) -> Samples:
-        wavefront = getattr(self._worker, "wavefront", None)
-        if wavefront is None:
+        try:
+            wavefront = self._idle.get_nowait()
+        except Empty:
             wavefront = Wavefront(self.traced, self.camera, self._fast_bodies, self.settings.seed)
-            self._worker.wavefront = wavefront
-        return wavefront.trace(index, first, last)
+        try:
+            return wavefront.trace(index, first, last)
+        finally:
+            self._idle.put(wavefront)
 
     def _add(self, units: list[Samples], index: int) -> None:
         width, height = self.scene.camera.resolution
