@@ -23,8 +23,9 @@ from ..optics.slab import diffusion
 
 Float32 = NDArray[np.float32]
 
-BLOCK = 8192
-"""Points worked on at a time: three rows of float32 stay below the 128 kB from which memory is fresh pages."""
+BLOCK = 16384
+"""Points worked on at a time: few enough for the second-level cache, and enough that threads seldom wait for each
+other between NumPy's calls (a plumb frame on two cores takes a fifth less than with 8192)."""
 
 
 class Caster(Protocol):
