@@ -83,6 +83,10 @@ def execute(
             )
         return False
 
+    def seconds_left() -> float:
+        assert budget.seconds is not None
+        return budget.started + budget.seconds - time.time()
+
     def after_pass(index: int) -> bool:
         nonlocal written_at, pass_at, pass_seconds
         now = time.time()
@@ -102,7 +106,7 @@ def execute(
 
     try:
         if not (resume and renderer.film.passes and finished()):
-            renderer.run(budget.left(renderer.film.ranges), after_pass)
+            renderer.run(budget.left(renderer.film.ranges), after_pass, seconds_left if budget.seconds else None)
     except KeyboardInterrupt:
         if renderer.film.passes:
             write()

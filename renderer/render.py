@@ -10,6 +10,7 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from hashlib import blake2b
+from itertools import islice, pairwise
 from queue import Empty, SimpleQueue
 
 import numpy as np
@@ -32,8 +33,11 @@ from .wavefront import Samples, Wavefront
 
 SHADER_ID = {"path": 0, "plumb": 1, "scalar": 2, "diffuse": 3}
 """In pictures; opaque objects and the background have -1."""
-_UNIT_PIXELS = 32768
-"""Camera samples of a work unit: some 0.1 s of work, so that threads end together."""
+_UNIT_SAMPLES = 2**18
+"""Camera samples of a work unit, at most. The last paths of a unit walk on in ever smaller company, up to a thousand
+steps in dense media, so units are as large as ``_UNIT_SECONDS`` allow; small pictures take many passes at once."""
+_UNIT_SECONDS = 1.0
+_LEAST_UNIT_PIXELS = 8192
 
 
 @dataclass(frozen=True)
@@ -99,65 +103,95 @@ class Renderer:
         # their buffers outlive the threads of one ``run``
         self._idle: SimpleQueue[Wavefront] = SimpleQueue()
 
-    def run(self, passes: Iterable[int], done: Callable[[int], bool] | None = None) -> None:
+    def run(
+        self,
+        passes: Iterable[int],
+        done: Callable[[int], bool] | None = None,
+        seconds_left: Callable[[], float] | None = None,
+    ) -> None:
         """Add passes to the film, in the order given.
 
-        done  is told the number of each pass when it is in the film; where it returns True, no more are begun,
-              and those under way are dropped. On KeyboardInterrupt the film keeps all whole passes.
+        done          is told the number of each pass when it is in the film; where it returns True, no more are
+                      begun, and those under way are dropped. On KeyboardInterrupt the film keeps all whole passes
+        seconds_left  how long the caller wants to go on: passes taken together become fewer towards the end
         """
         threads = self.settings.threads or os.cpu_count() or 1
-        width, height = self.scene.camera.resolution
-        starts = range(0, width * height, _UNIT_PIXELS)
-        begun: deque[tuple[int, list[Future[Samples]]]] = deque()
+        begun: deque[_Batch] = deque()
+        waiting = iter(passes)
         with self.stages.stage("render"), ThreadPoolExecutor(threads) as pool:
+            start, finished = time.perf_counter(), 0
             try:
-                waiting = iter(passes)
                 while True:
                     # enough units under way that no thread waits for the slowest unit of a pass
-                    while sum(not unit.done() for _, units in begun for unit in units) < 2 * threads:
-                        index = next(waiting, None)
-                        if index is None:
+                    while sum(not unit.done() for batch in begun for unit in batch.units) < 2 * threads:
+                        pace = (time.perf_counter() - start) / finished if finished else None
+                        numbers = list(islice(waiting, self._passes_at_once(pace, seconds_left)))
+                        if not numbers:
                             break
-                        units = [
-                            pool.submit(self._trace, index, start, min(start + _UNIT_PIXELS, width * height))
-                            for start in starts
-                        ]
-                        begun.append((index, units))
+                        begun.extend(self._begin(pool, run, threads) for run in _consecutive(numbers))
                     if not begun:
                         return
-                    index, units = begun.popleft()
-                    self._add([unit.result() for unit in units], index)
-                    if done is not None and done(index):
-                        return
+                    batch = begun.popleft()
+                    samples = [unit.result() for unit in batch.units]
+                    for k, index in enumerate(batch.passes):
+                        self._add(samples, k, index)
+                        finished += 1
+                        if done is not None and done(index):
+                            return
             finally:
-                for _, units in begun:
-                    for unit in units:
+                for batch in begun:
+                    for unit in batch.units:
                         unit.cancel()
+
+    def _passes_at_once(self, pace: float | None, seconds_left: Callable[[], float] | None) -> int:
+        """How many passes a unit takes, where one takes ``pace`` seconds; one until that is known."""
+        width, height = self.scene.camera.resolution
+        if pace is None or self._fast_bodies:
+            return 1
+        seconds = _UNIT_SECONDS if seconds_left is None else min(_UNIT_SECONDS, seconds_left() / 8)
+        return int(np.clip(min(seconds / max(pace, 1e-9), _UNIT_SAMPLES / (width * height)), 1, _UNIT_SAMPLES))
+
+    def _begin(self, pool: ThreadPoolExecutor, passes: range, threads: int) -> _Batch:
+        """Submit the units of some passes: whole pictures where there are many passes, else parts of one."""
+        width, height = self.scene.camera.resolution
+        pixels = width * height
+        parts = (
+            max(pixels // _UNIT_SAMPLES, min(2 * threads, pixels // _LEAST_UNIT_PIXELS), 1) if len(passes) == 1 else 1
+        )
+        bounds = np.linspace(0, pixels, parts + 1).astype(int)
+        units = [
+            pool.submit(self._trace, passes.start, int(first), int(last), len(passes))
+            for first, last in pairwise(bounds)
+        ]
+        return _Batch(passes, units)
 
     def picture(self, seconds: float, aovs: dict[str, NDArray] | None = None) -> Picture:
         """What is written to a file; ``seconds`` is the wall time to state in it."""
         return Picture(self.film, seconds, self.shader_id, self.object_id, aovs or {})
 
-    def _trace(self, index: int, first: int, last: int) -> Samples:
+    def _trace(self, first_pass: int, first: int, last: int, passes: int) -> Samples:
         try:
             wavefront = self._idle.get_nowait()
         except Empty:
             wavefront = Wavefront(self.traced, self.camera, self._fast_bodies, self.settings.seed)
         try:
-            return wavefront.trace(index, first, last)
+            return wavefront.trace(first_pass, first, last, passes)
         finally:
             self._idle.put(wavefront)
 
-    def _add(self, units: list[Samples], index: int) -> None:
+    def _add(self, units: list[Samples], k: int, index: int) -> None:
+        """Add the k-th pass of the units to the film, as pass ``index``."""
         width, height = self.scene.camera.resolution
-        radiance = np.concatenate([unit.radiance for unit in units], axis=1).T.reshape(height, width, 3)
-        first = np.concatenate([unit.first_object for unit in units]).reshape(height, width)
+        parts = [unit.of_pass(k) for unit in units]
+        radiance = np.concatenate([part for part, _ in parts], axis=1).T.reshape(height, width, 3)
+        first = np.concatenate([part for _, part in parts]).reshape(height, width)
         # -1, nothing, is the last entry
         translucent = np.array([*(thing.medium is not None for thing in self.traced.objects), False])
         fast = np.array([*(thing.index in self._fast_bodies for thing in self.traced.objects), False])
         self.film.add_pass(index, radiance, translucent[first], fast[first])
-        for unit in units:
-            self.tally.add(unit.tally)
+        if k == 0:
+            for unit in units:
+                self.tally.add(unit.tally)
         self.tally.non_finite = self.film.non_finite
 
     def _identify(self) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
@@ -169,6 +203,23 @@ class Renderer:
         thing = np.where(triangle >= 0, self.traced.triangle_object[triangle], -1).astype(np.int32)
         shaders = np.array([*(SHADER_ID.get(plan.shader, -1) for plan in self.plans), -1], np.int32)
         return shaders[thing].reshape(height, width), thing.reshape(height, width)
+
+
+@dataclass(frozen=True)
+class _Batch:
+    """Passes under way: the units of all of them are the parts of the picture."""
+
+    passes: range
+    units: list[Future[Samples]]
+
+
+def _consecutive(numbers: list[int]) -> Iterator[range]:
+    """The numbers as ranges without gaps."""
+    start = 0
+    for k in range(1, len(numbers) + 1):
+        if k == len(numbers) or numbers[k] != numbers[k - 1] + 1:
+            yield range(numbers[start], numbers[k - 1] + 1)
+            start = k
 
 
 def planned_hash(scene: Scene, plans: list[Plan]) -> str:

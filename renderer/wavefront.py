@@ -1,55 +1,67 @@
-"""The tracer's loop: emit, fly, intersect, interact, compact, refill.
+"""The tracer's loop: emit, fly, meet surfaces, walk in media, refill.
 
-All camera samples of a work unit go through one fixed set of slots; as paths end, new ones take their place.
-What a sample's path does depends on its own stream alone, so results do not depend on slots, units or threads.
+All camera samples of a work unit share a fixed number of paths in flight; as paths end, new ones are emitted.
+What a sample's paths do depends on their own streams alone, so results do not depend on units or threads.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import partial
+from operator import itemgetter
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .scene.beams import beams
 from .scene.camera import CameraRays
-from .shaders.boundary import meet_boundary
+from .shaders.boundary import meet_boundary, split
 from .shaders.fast_body import FastBody
 from .shaders.opaque import meet_diffuse, meet_mirror
-from .shaders.path import ROULETTE_BELOW, PathShader
-from .tracing.paths import OUTSIDE, Paths
+from .shaders.path import MediumWalk
+from .tracing.paths import Paths
+from .tracing.roulette import play_at_surfaces
 from .tracing.streams import Uniforms, stream_keys
 from .tracing.tally import Tally
-from .tracing.traced_scene import MISS, TracedScene
+from .tracing.traced_scene import TracedScene
 
 Float32 = NDArray[np.float32]
 BLOCK = 16384
-"""Slots of a worker: large enough to hide NumPy's call overhead, small enough for the second-level cache."""
+"""Paths in flight of a worker: enough to hide NumPy's call overhead, and few enough for the second-level cache."""
 
 _REFILL_AT = 1 / 2
-_COMPACT_AT = 3 / 4
-_MANY_SURFACES = 256
 NOTHING = np.int16(-1)
 
 
 @dataclass
 class Samples:
-    """Camera samples of one work unit.
+    """Camera samples of one work unit: pass after pass, pixel after pixel.
 
-    radiance      (3, m) float32
-    first_object  (m,) int16 object that the sample met first, -1 for none
+    radiance      (3, passes * pixels) float32
+    first_object  (passes * pixels,) int16 object that the sample met first, -1 for none
+    passes        how many
     """
 
     radiance: Float32
     first_object: NDArray[np.int16]
+    passes: int = 1
     tally: Tally = field(default_factory=Tally)
+
+    def of_pass(self, k: int) -> tuple[Float32, NDArray[np.int16]]:
+        """Radiance and first object of the k-th pass."""
+        pixels = len(self.first_object) // self.passes
+        mine = slice(k * pixels, (k + 1) * pixels)
+        return self.radiance[:, mine], self.first_object[mine]
 
 
 class Wavefront:
     """Traces camera samples; one instance a thread.
 
     fast_bodies  the objects that a shader other than path lights, by object index
+
+    A path is in one of several places: flying outside, standing on a surface, or in one of the media. Each step
+    takes all paths of the fullest place one event further.
     """
 
     def __init__(
@@ -61,154 +73,156 @@ class Wavefront:
         block: int = BLOCK,
     ):
         self.scene, self.camera, self.seed = scene, camera, seed
-        self._paths = Paths(block, scene.media.count)
+        block = max(block, 2)  # a path and its branch
         self._uniforms = Uniforms(block)
         self._tally = Tally()
-        self._path_shader = PathShader(scene, block, self._uniforms, self._tally)
+        self._flying, self._standing = (Paths(block, scene.media.count) for _ in range(2))
+        self._walks = [MediumWalk(scene, slot, block, self._uniforms, self._tally) for slot in range(scene.media.count)]
         self._fast_bodies = fast_bodies
         # how each object answers a ray, for scenes with more than one kind of surface
         self._kind = [thing.shader for thing in scene.objects]
 
-    def trace(self, pass_index: int, first_pixel: int, last_pixel: int) -> Samples:
-        """Sample ``pass_index`` of the pixels in [first_pixel, last_pixel), counted along the rows."""
-        paths, count = self._paths, last_pixel - first_pixel
-        result = Samples(np.zeros((3, count), np.float32), np.full(count, NOTHING))
+    def trace(self, first_pass: int, first_pixel: int, last_pixel: int, passes: int = 1) -> Samples:
+        """Samples of the pixels in [first_pixel, last_pixel), counted along the rows, in ``passes`` passes.
+
+        Pass after pass, pixel after pixel. Fast bodies are lit by other beams in each pass: with them in the scene
+        there must be one pass.
+        """
+        if passes > 1 and self._fast_bodies:
+            raise ValueError("fast shaders take one pass at a time")
+        self._first_pass, self._first_pixel, self._pixels = first_pass, first_pixel, last_pixel - first_pixel
+        count = passes * self._pixels
+        # the second half is for the branches of paths that split
+        self._radiance = np.zeros((3, 2 * count), np.float32)
+        self._samples = count
+        self._first_object = np.full(count, NOTHING)
         self._first_unknown = np.ones(count, bool)
-        self._beams = beams(self.scene.lights, pass_index) if self._fast_bodies else []
-        paths.clear()
+        self._beams = beams(self.scene.lights, first_pass) if self._fast_bodies else []
+        for place in (self._flying, self._standing):
+            place.clear()
+        for walk in self._walks:
+            walk.clear()
         emitted = 0
         while True:
-            if emitted < count and paths.count <= paths.capacity * _REFILL_AT:
-                new = min(paths.free, count - emitted)
-                self._emit(pass_index, first_pixel, emitted, new)
+            # every path outside may still split in two
+            branches = 2 if self._walks else 1
+            taken = branches * (self._flying.count + self._standing.count) + sum(walk.count for walk in self._walks)
+            if emitted < count and taken <= self._flying.capacity * _REFILL_AT:
+                new = min((self._flying.capacity - taken) // branches, count - emitted)
+                self._emit(emitted, new)
                 emitted += new
-            if paths.count == 0:
+            elif taken == 0:
                 break
-            self._step(result)
-            living = np.count_nonzero(paths.alive)
-            if living <= paths.count * _COMPACT_AT:
-                paths.compact()
-        result.tally = self._tally.take()
+            self._step()
+        radiance = self._radiance[:, :count] + self._radiance[:, count:]
+        result = Samples(radiance, self._first_object, passes, self._tally.take())
         result.tally.samples = count
         return result
 
-    def _emit(self, pass_index: int, first_pixel: int, first_sample: int, count: int) -> None:
+    def _emit(self, first_sample: int, count: int) -> None:
         samples = np.arange(first_sample, first_sample + count)
-        streams = stream_keys(self.seed, pass_index, samples + first_pixel)
+        passes, pixels = np.divmod(samples, max(self._pixels, 1))
+        pixels += self._first_pixel
+        streams = stream_keys(self.seed, passes + self._first_pass, pixels)
         jitter = np.stack(self._uniforms.draw(streams))
-        direction = self.camera.directions(samples + first_pixel, jitter)
-        self._paths.emit(self.camera.origin[:, None], direction, streams, samples)
+        direction = self.camera.directions(pixels, jitter)
+        self._flying.emit(self.camera.origin[:, None], direction, streams, samples)
 
-    def _step(self, result: Samples) -> None:
-        """Take every path one event further."""
-        paths, shader = self._paths, self._path_shader
-        limit = shader.fly(paths)
-        distance, emitter_or_triangle = self._intersect(limit)
-        inside = paths.owner != OUTSIDE
-        hit = (emitter_or_triangle != -1) & paths.alive
-        missed = (emitter_or_triangle == -1) & paths.alive
-        collided = missed & inside
-        escaped = np.flatnonzero(missed & ~inside)
-        if len(escaped):
-            background = self.scene.lights.background(paths.direction[:, escaped])
-            result.radiance[:, paths.sample[escaped]] += paths.throughput[:, escaped] * background
-            paths.alive[escaped] = False
-        np.copyto(distance, 0, where=distance >= MISS)
-        paths.origin += paths.direction * distance
-        if shader.any_medium:
-            shader.weigh_flights(paths, distance, collided)
-            # for all paths whether they collide or not: streams must not depend on who shares the block
-            shader.collide(paths, collided, result.radiance)
-        index = np.flatnonzero(hit)
-        if len(index):
-            self._meet(index, emitter_or_triangle[index], result)
-        self._roulette(collided)
+    def _step(self) -> None:
+        """Take the paths of the fullest place one event further."""
+        places = [(self._flying.count, self._fly), (self._standing.count, self._stand)]
+        for walk in self._walks:
+            places.append((walk.entering.count, partial(walk.fly_on, self._standing, self._radiance)))
+            places.append((walk.colliding.count, partial(walk.scatter, self._standing, self._radiance)))
+        _, step = max(places, key=itemgetter(0))
+        step()
 
-    def _intersect(self, limit: Float32 | None) -> tuple[Float32, NDArray[np.int32]]:
-        """Distance and triangle of what each path meets; triangle -1 for nothing, -2 - k for the k-th sphere light."""
-        paths = self._paths
-        distance, triangle = self.scene.closest(paths.origin, paths.direction, limit)
-        self._tally.rays += int(np.count_nonzero(paths.alive))
+    def _fly(self) -> None:
+        """Take the paths outside all media to the surfaces they meet; add the background that the others see."""
+        paths = self._flying
+        distance, triangle = self.scene.closest(paths.origin, paths.direction)
+        self._tally.rays += paths.count
         for k, sphere in enumerate(self.scene.lights.spheres):
             reach = sphere.distance(paths.origin, paths.direction)
             nearer = reach < distance
             np.copyto(distance, reach, where=nearer)
             np.copyto(triangle, np.int32(-2 - k), where=nearer)
-        return distance, triangle
+        escaped = np.flatnonzero(triangle == -1)
+        background = self.scene.lights.background(paths.direction[:, escaped])
+        self._radiance[:, paths.sample[escaped]] += paths.throughput[:, escaped] * background
+        np.copyto(distance, 0, where=triangle == -1)
+        paths.origin += paths.direction * distance
+        paths.triangle[:] = triangle
+        paths.remove(escaped)
+        paths.move(np.arange(paths.count), self._standing)
 
-    def _meet(self, index: NDArray[np.intp], triangle: NDArray[np.int32], result: Samples) -> None:
-        """What each surface does to the paths ``index`` that meet it."""
-        paths, scene = self._paths, self.scene
+    def _stand(self) -> None:
+        """Reflect, refract or end the paths that stand on surfaces, and send them where they now belong."""
+        paths = self._standing
+        self._meet()
+        play_at_surfaces(paths, self._uniforms)
+        paths.bury()
+        for slot, walk in enumerate(self._walks):
+            inside = np.flatnonzero(paths.owner == slot)
+            where = paths.move(inside, walk.entering)
+            walk.entering.axis[:, where] = self.scene.triangle_normal.take(walk.entering.triangle[where], axis=1)
+        paths.move(np.arange(paths.count), self._flying)
+
+    def _meet(self) -> None:
+        """What each surface does to the paths that stand on it."""
+        paths, scene = self._standing, self.scene
+        split(scene, paths, self._samples)
+        index, triangle = np.arange(paths.count), paths.triangle.copy()
         spheres = triangle < 0
         if spheres.any():
-            self._meet_spheres(index[spheres], -2 - triangle[spheres], result)
+            self._meet_spheres(index[spheres], -2 - triangle[spheres])
             index, triangle = index[~spheres], triangle[~spheres]
         paths.origin[:, index] = scene.on_plane(paths.origin[:, index], triangle)
         paths.surfaces[index] += 1
         thing = scene.triangle_object[triangle]
-        self._note_first(index, thing, result)
+        self._note_first(index, thing)
         for k, kind in enumerate(self._kind):
             here = np.flatnonzero(thing == k) if len(self._kind) > 1 or scene.lights.rectangles else slice(None)
             who, faces = index[here], triangle[here]
             if not len(who):
                 continue
             if kind == "path":
-                meet_boundary(scene, paths, who, faces, self._uniforms, self._tally, result.radiance)
+                meet_boundary(scene, paths, who, faces, self._uniforms, self._tally, self._radiance)
             elif kind == "opaque":
-                meet_diffuse(scene, paths, who, faces, self._uniforms, self._tally, result.radiance)
+                meet_diffuse(scene, paths, who, faces, self._uniforms, self._tally, self._radiance)
             elif kind == "mirror":
                 meet_mirror(scene, paths, who, faces)
             else:
                 self._fast_bodies[k].meet(
-                    scene, paths, who, faces, self._beams, self._uniforms, self._tally, result.radiance
+                    scene, paths, who, faces, self._beams, self._uniforms, self._tally, self._radiance
                 )
         if scene.lights.rectangles:
             here = np.flatnonzero(thing < 0)
-            self._meet_rectangles(index[here], triangle[here], result)
+            self._meet_rectangles(index[here], triangle[here])
 
-    def _note_first(self, index: NDArray[np.intp], thing: NDArray[np.int16], result: Samples) -> None:
-        sample = self._paths.sample[index]
-        new = self._first_unknown[sample]
-        if new.any():
-            result.first_object[sample[new]] = thing[new]
-            self._first_unknown[sample[new]] = False
+    def _note_first(self, index: NDArray[np.intp], thing: NDArray[np.int16]) -> None:
+        # of a split path one branch is enough
+        sample = self._standing.sample[index]
+        first = np.flatnonzero(sample < self._samples)
+        first = first[self._first_unknown[sample[first]]]
+        self._first_object[sample[first]] = thing[first]
+        self._first_unknown[sample[first]] = False
 
-    def _meet_rectangles(self, index: NDArray[np.intp], triangle: NDArray[np.int32], result: Samples) -> None:
+    def _meet_rectangles(self, index: NDArray[np.intp], triangle: NDArray[np.int32]) -> None:
         """Add the radiance of rectangle lights seen from the front; they end every path."""
-        paths, scene = self._paths, self.scene
+        paths, scene = self._standing, self.scene
         for k, rectangle in enumerate(scene.lights.rectangles):
             mine = index[(triangle - scene.first_light_triangle) // 2 == k]
             front = np.einsum("ij,ik->k", rectangle.normal, paths.direction[:, mine]) < 0
             seen = mine[front & ~paths.lit[mine]]
-            result.radiance[:, paths.sample[seen]] += paths.throughput[:, seen] * rectangle.radiance
+            self._radiance[:, paths.sample[seen]] += paths.throughput[:, seen] * rectangle.radiance
         paths.alive[index] = False
 
-    def _meet_spheres(self, index: NDArray[np.intp], which: NDArray[np.int32], result: Samples) -> None:
+    def _meet_spheres(self, index: NDArray[np.intp], which: NDArray[np.int32]) -> None:
         """Add the radiance of sphere lights; they end every path."""
-        paths = self._paths
-        self._note_first(index, np.full(len(index), NOTHING), result)
+        paths = self._standing
+        self._note_first(index, np.full(len(index), NOTHING))
         for k, sphere in enumerate(self.scene.lights.spheres):
             seen = index[(which == k) & ~paths.lit[index]]
-            result.radiance[:, paths.sample[seen]] += paths.throughput[:, seen] * sphere.radiance
+            self._radiance[:, paths.sample[seen]] += paths.throughput[:, seen] * sphere.radiance
         paths.alive[index] = False
-
-    def _roulette(self, collided: NDArray[np.bool_]) -> None:
-        """End faint paths, unbiased: survive with twice the largest channel, then weigh up to a half.
-
-        Played after collisions and from the fourth surface on, so that a single reflection stays free of noise.
-        Light that 256 surfaces keep inside a clear body without a collision would circle for ever: it goes on
-        with probability 0.9 a time.
-        """
-        paths = self._paths
-        largest = np.maximum.reduce(paths.throughput, axis=0)
-        survival = 2 * largest
-        np.copyto(survival, 1, where=(largest >= ROULETTE_BELOW) | ~(collided | (paths.surfaces > 3)))
-        np.copyto(survival, np.minimum(survival, np.float32(0.9)), where=paths.surfaces > _MANY_SURFACES)
-        index = np.flatnonzero((survival < 1) & paths.alive)
-        if len(index):
-            u, _ = self._uniforms.draw_at(paths.stream, index)
-            chance = survival[index]
-            lives = u < chance
-            paths.alive[index[~lives]] = False
-            index = index[lives]
-            paths.throughput[:, index] /= chance[lives]

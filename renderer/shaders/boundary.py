@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 
 from ..optics.dielectric import fresnel_reflectance
 from ..optics.microfacet import sample_visible_facet, unmasked
-from ..tracing.paths import Paths
-from ..tracing.streams import Uniforms
+from ..tracing.paths import CHANCE, OUTSIDE, REFLECTS, REFRACTS, WHOLE, Paths
+from ..tracing.streams import Uniforms, branch_streams
 from ..tracing.tally import Tally
 from ..tracing.traced_scene import TracedScene, offset_from
 from .crossings import Crossings
@@ -17,6 +17,26 @@ from .lost_paths import lose
 from .point_light import light_exits, light_rough
 
 Float32 = NDArray[np.float32]
+
+
+def split(scene: TracedScene, paths: Paths, samples: int) -> None:
+    """Split the whole paths that are about to enter a body: each will refract, a copy of it reflect.
+
+    What the first boundary reflects and what comes from inside are so different that leaving the choice to chance is
+    most of the noise of a dark body. Copies add to the radiance ``samples`` columns on, so that a sum does not
+    depend on which branch ends first.
+    """
+    whole = np.flatnonzero((paths.branch == WHOLE) & (paths.owner == OUTSIDE) & (paths.triangle >= 0))
+    triangle = paths.triangle[whole]
+    slot = scene.slot_of_triangle[triangle]
+    entering = np.einsum("ij,ij->j", paths.direction[:, whole], scene.triangle_normal[:, triangle]) < 0
+    bends = (slot >= 0) & (scene.media.ior[slot] != 1) & (paths.inside[slot, whole] == 0)
+    whole = whole[bends & entering]
+    if len(whole):
+        paths.branch[whole] = REFRACTS
+        copies = paths.append(paths, whole)
+        paths.branch[copies] = REFLECTS
+        paths.sample[copies] += np.int32(samples)
 
 
 def meet_boundary(
@@ -48,7 +68,7 @@ def meet_boundary(
     smooth = np.flatnonzero(~straight & ~rough)
     if len(smooth):
         turned[:, smooth], reflected[smooth] = _turn(
-            at.direction[:, smooth], at.facing[:, smooth], at.eta[smooth], choice[smooth]
+            at.direction[:, smooth], at.facing[:, smooth], at.eta[smooth], choice[smooth], paths, at.index[smooth]
         )
         if scene.lights.points:
             light_exits(scene, paths, at.take(smooth[~reflected[smooth]]), tally, radiance)
@@ -59,6 +79,10 @@ def meet_boundary(
             turned[:, mine], reflected[mine] = _scatter_rough(
                 scene, paths, at.take(mine), thing.roughness, choice[mine], u1[mine], u2, tally, radiance
             )
+    # only now: both branches of a path must have met the same facet
+    copies = at.index[paths.branch[at.index] == REFLECTS]
+    paths.stream[copies] = branch_streams(paths.stream[copies])
+    paths.branch[at.index[~straight]] = CHANCE
     _keep_side(turned, at.near_normal, reflected)
     crossed = at.index[~reflected]
     paths.inside[:, crossed] = at.inside_beyond[:, ~reflected]
@@ -72,16 +96,28 @@ def meet_boundary(
     paths.origin[:, at.index] = offset_from(at.position, at.near_normal, side)
 
 
-def _turn(direction: Float32, normal: Float32, eta: Float32, u: Float32) -> tuple[Float32, NDArray[np.bool_]]:
+def _turn(
+    direction: Float32, normal: Float32, eta: Float32, u: Float32, paths: Paths, index: NDArray[np.intp]
+) -> tuple[Float32, NDArray[np.bool_]]:
     """Snell's law and Fresnel's choice: new directions (3, n), and whether they are reflected.
 
     direction  (3, n) unit, of travel; normal (3, n) unit, against it
     eta        (n,) index beyond over before
-    u          (n,) uniforms: reflected where they are below the reflectance
+    u          (n,) uniforms: reflected where they are below the reflectance. The two branches of a split path have
+               no choice, and are weighed by their share instead
     """
     cos_in = np.clip(-np.einsum("ij,ij->j", direction, normal), 0, 1)
     reflectance, cos_out = fresnel_reflectance(cos_in, eta)
     reflected = u < reflectance
+    branch = paths.branch[index]
+    split = np.flatnonzero((branch == REFLECTS) | (branch == REFRACTS))
+    if len(split):
+        reflected[split] = branch[split] == REFLECTS
+        share = np.where(reflected[split], reflectance[split], 1 - reflectance[split])
+        paths.throughput[:, index[split]] *= share
+        # roulette must not take a branch for faint because its share is: the branches of a white body add up to 1
+        paths.faint[index[split]] *= share
+        paths.alive[index[split]] &= share > 0
     inverse = 1 / eta
     along = np.where(reflected, 2 * cos_in, cos_in * inverse - cos_out)
     turned = np.where(reflected, 1, inverse) * direction + along * normal
@@ -99,9 +135,11 @@ def _scatter_rough(
     frame = LocalFrame(at.facing)
     view = frame.to_local(-at.direction)
     if scene.lights.points:
-        light_rough(scene, paths, at, frame, view, tally, radiance)
+        # of a path that was split, one branch speaks for both
+        speaks = np.flatnonzero(paths.branch[at.index] != REFLECTS)
+        light_rough(scene, paths, at.take(speaks), frame.take(speaks), view[:, speaks], tally, radiance)
     facet = sample_visible_facet(view, alpha, u1, u2)
-    turned, reflected = _turn(-view, facet, at.eta, choice)
+    turned, reflected = _turn(-view, facet, at.eta, choice, paths, at.index)
     # single scattering: what ends on the wrong side would meet a second facet, and is lost
     valid = np.where(reflected, turned[2] > 0, turned[2] < 0)
     paths.throughput[:, at.index] *= np.where(valid, unmasked(turned[2], alpha), 0)

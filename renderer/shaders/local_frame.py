@@ -21,6 +21,12 @@ class LocalFrame:
         self.second = around(normal, unit)
         self.normal = normal
 
+    def take(self, columns: NDArray[np.intp]) -> LocalFrame:
+        """The axes at the given columns."""
+        some = object.__new__(LocalFrame)
+        some.first, some.second, some.normal = (a[:, columns] for a in (self.first, self.second, self.normal))
+        return some
+
     def to_local(self, world: Float32) -> Float32:
         """(3, n) components along the axes."""
         return np.stack([np.einsum("ij,ij->j", axis, world) for axis in (self.first, self.second, self.normal)])

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..optics.phase import around, spherical
-from ..tracing.paths import Paths
+from ..tracing.paths import CHANCE, Paths
 from ..tracing.streams import Uniforms
 from ..tracing.tally import Tally
 from ..tracing.traced_scene import TracedScene, offset_from
@@ -56,6 +56,7 @@ def meet_diffuse(
     paths.direction[:, index] = turned
     paths.origin[:, index] = offset_from(position, facing, np.ones_like(side))
     paths.lit[index] = True
+    paths.branch[index] = CHANCE
 
 
 def meet_mirror(scene: TracedScene, paths: Paths, index: Indices, triangle: NDArray[np.int32]) -> None:

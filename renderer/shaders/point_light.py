@@ -23,29 +23,21 @@ from .local_frame import LocalFrame
 Float32 = NDArray[np.float32]
 
 
-def light_collisions(
-    scene: TracedScene, paths: Paths, index: NDArray[np.intp], tally: Tally, radiance: Float32
-) -> None:
-    """Light the collisions of the paths ``index`` that lie behind invisible boundaries.
+def light_collisions(scene: TracedScene, paths: Paths, slot: int, tally: Tally, radiance: Float32) -> None:
+    """Light the paths, all at collisions in the medium ``slot``, which lies behind an invisible boundary.
 
         w p(mu) E0 exp(-optical depth), w with this collision's albedo
 
     ``paths.direction`` must still be the one before the collision.
     """
-    media = scene.media
-    index = index[media.ior[paths.owner[index]] == 1]
-    if not len(index):
+    if not paths.count:
         return
-    position, direction = paths.origin[:, index], paths.direction[:, index]
-    owner, sample = paths.owner[index], paths.sample[index]
+    media = scene.media
     for source in scene.lights.points:
-        light = source.illuminate(position)
-        mu = np.einsum("ij,ij->j", direction, light.direction)
-        phase = np.empty_like(mu)
-        for slot, g in enumerate(media.g):
-            np.copyto(phase, henyey_greenstein(mu, g), where=owner == slot)
-        visible = shadow_transmittance(scene, media, position, light, paths.inside[:, index], owner, tally)
-        radiance[:, sample] += paths.throughput[:, index] * light.irradiance * (phase * visible)
+        light = source.illuminate(paths.origin)
+        phase = henyey_greenstein(np.einsum("ij,ij->j", paths.direction, light.direction), media.g[slot])
+        visible = shadow_transmittance(scene, media, paths.origin, light, paths.inside, paths.owner, tally)
+        radiance[:, paths.sample] += paths.throughput * light.irradiance * (phase * visible)
 
 
 def light_rough(

@@ -8,21 +8,30 @@ import numpy as np
 from numpy.typing import NDArray
 
 OUTSIDE = np.int16(-1)
+ROULETTE_BELOW = np.float32(0.25)
+"""Throughput below which roulette plays, as a share of what a path began with: later thresholds cost 10-25 % on
+thick bodies, earlier ones deep shadow."""
 
 
 class Paths:
     """Up to ``capacity`` paths, one column each; the first ``count`` are in use. Lengths in the unit-size frame.
 
+    The order of the columns means nothing: where a path is removed, the last one takes its place.
+
     origin      (3, n) float32
     direction   (3, n) float32 unit, the way the path is followed (against the light)
     throughput  (3, n) float32, a row a colour channel: radiance found next, times this, reaches the camera
+    faint       (n,) float32 largest throughput below which roulette plays
+    axis        (3, n) float32 unit, outward normal where the path last stood on a surface
     stream      (n,) uint64 state of the path's random numbers
-    sample      (n,) int32 camera sample to which radiance is added
+    sample      (n,) int32 column of the radiance that the path adds to
+    triangle    (n,) int32 where the path stands, for paths on surfaces
     inside      (k, n) int8 how many times inside each of the k translucent objects: entered minus left
     owner       (n,) int16 which of the k owns the medium here (the first that the path is inside of), -1 outside
     scattered   (n,) bool, whether the path has collided since a boundary last bent it inwards
     lit         (n,) bool, whether area lights were already sampled from the last vertex, so that meeting one
                 now must not count again
+    branch      (n,) int8 what the path does at the next boundary, see ``WHOLE``
     surfaces    (n,) int16 surfaces met since the last collision
     alive       (n,) bool
     """
@@ -33,29 +42,36 @@ class Paths:
             "origin": np.empty((3, capacity), np.float32),
             "direction": np.empty((3, capacity), np.float32),
             "throughput": np.empty((3, capacity), np.float32),
+            "faint": np.empty(capacity, np.float32),
+            "axis": np.empty((3, capacity), np.float32),
             "stream": np.empty(capacity, np.uint64),
             "sample": np.empty(capacity, np.int32),
+            "triangle": np.empty(capacity, np.int32),
             "inside": np.empty((max(translucent_objects, 1), capacity), np.int8),
             "owner": np.empty(capacity, np.int16),
             "scattered": np.empty(capacity, bool),
             "lit": np.empty(capacity, bool),
+            "branch": np.empty(capacity, np.int8),
             "surfaces": np.empty(capacity, np.int16),
             "alive": np.empty(capacity, bool),
         }
+        self._rows = [row for array in self._store.values() for row in (array if array.ndim == 2 else (array,))]
         self._view()
 
     def _view(self) -> None:
         """Point the public arrays at the columns in use."""
         n = self.count
         store = {name: array[..., :n] for name, array in self._store.items()}
-        self.origin, self.direction, self.throughput = (
+        self.origin, self.direction, self.throughput, self.axis = (
             store["origin"],
             store["direction"],
             store["throughput"],
+            store["axis"],
         )
-        self.stream, self.sample, self.inside = store["stream"], store["sample"], store["inside"]
-        self.owner, self.scattered = store["owner"], store["scattered"]
-        self.lit, self.surfaces, self.alive = store["lit"], store["surfaces"], store["alive"]
+        self.faint, self.stream, self.sample = store["faint"], store["stream"], store["sample"]
+        self.triangle, self.inside, self.owner = store["triangle"], store["inside"], store["owner"]
+        self.scattered, self.lit, self.branch = store["scattered"], store["lit"], store["branch"]
+        self.surfaces, self.alive = store["surfaces"], store["alive"]
 
     @property
     def free(self) -> int:
@@ -69,27 +85,62 @@ class Paths:
 
     def emit(self, origin, direction, stream, sample) -> None:
         """Append paths that start outside all objects with throughput 1."""
-        first, self.count = self.count, self.count + len(sample)
-        if self.count > self.capacity:
-            raise ValueError(f"{len(sample)} new paths do not fit into {self.capacity - first} free columns")
-        new = slice(first, self.count)
+        new = self._extend(len(sample))
         store = self._store
         store["origin"][:, new], store["direction"][:, new] = origin, direction
         store["stream"][new], store["sample"][new] = stream, sample
         store["throughput"][:, new] = 1
+        store["faint"][new] = ROULETTE_BELOW
         store["inside"][:, new] = 0
         store["owner"][new] = OUTSIDE
         store["scattered"][new] = store["lit"][new] = False
+        store["branch"][new] = WHOLE
         store["surfaces"][new] = 0
         store["alive"][new] = True
+
+    def append(self, others: Paths, index: NDArray[np.intp]) -> slice:
+        """Copies of the columns ``index`` of ``others`` at the end; where they are."""
+        new = self._extend(len(index))
+        for row, source in zip(self._rows, others._rows, strict=True):
+            source.take(index, out=row[new], mode="clip")
+        return new
+
+    def move(self, index: NDArray[np.intp], into: Paths) -> slice:
+        """Take the columns ``index``, ascending, away and append them to ``into``; where they are there."""
+        new = into.append(self, index)
+        self.remove(index)
+        return new
+
+    def remove(self, index: NDArray[np.intp]) -> None:
+        """Take the columns ``index``, ascending, away; the last columns fill the gaps."""
+        if not len(index):
+            return
+        last = self.count - len(index)
+        first_beyond = int(np.searchsorted(index, last))
+        gaps = index[:first_beyond]
+        if len(gaps):
+            stays = np.ones(self.count - last, bool)
+            stays[index[first_beyond:] - last] = False
+            fill = last + np.flatnonzero(stays)
+            for row in self._rows:
+                row[gaps] = row[fill]
+        self.count = last
         self._view()
 
-    def compact(self) -> None:
-        """Keep the living, in their order."""
-        keep = np.flatnonzero(self.alive)
-        if len(keep) < self.count:
-            for array in self._store.values():
-                for row in array if array.ndim == 2 else (array,):
-                    row[: len(keep)] = row[: self.count][keep]
-            self.count = len(keep)
-            self._view()
+    def bury(self) -> None:
+        """Remove the paths that are not alive."""
+        self.remove(np.flatnonzero(~self.alive))
+
+    def _extend(self, count: int) -> slice:
+        """Place for ``count`` more columns."""
+        if count > self.free:
+            raise ValueError(f"{count} new paths do not fit into {self.free} free columns")
+        new = slice(self.count, self.count + count)
+        self.count += count
+        self._view()
+        return new
+
+
+WHOLE, REFLECTS, REFRACTS, CHANCE = np.arange(4, dtype=np.int8)
+"""``Paths.branch``. A path from the camera is whole: the first dielectric boundary splits it into one that reflects
+and one that refracts. From there on chance decides."""

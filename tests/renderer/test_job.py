@@ -61,12 +61,12 @@ def test_time_stops_before_a_pass_that_would_not_fit(tmp_path, monkeypatch):
     renderer = ready()
     run = renderer.run
 
-    def slow_run(passes, done):
+    def slow_run(passes, done, seconds_left):
         def after(index):
             clock[0] += 2.0
             return done(index)
 
-        run(passes, after)
+        run(passes, after, seconds_left)
 
     monkeypatch.setattr(renderer, "run", slow_run)
     assert execute(renderer, tmp_path / "out.png", Budget(0, None, seconds=7.0, started=1000.0)).film.passes == 3

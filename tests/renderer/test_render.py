@@ -35,10 +35,13 @@ def same_bits(one, two) -> bool:
 
 @pytest.mark.parametrize("shader", ["path", "plumb", "scalar"])
 def test_threads_and_the_size_of_work_units_do_not_show(monkeypatch, shader):
-    whole = filmed(small_scene(), shader=shader, threads=1)
-    for threads, unit in ((2, 32768), (1, 100), (2, 100), (5, 37)):
-        monkeypatch.setattr(render, "_UNIT_PIXELS", unit)
-        assert same_bits(whole, filmed(small_scene(), shader=shader, threads=threads)), (threads, unit)
+    """Parts of passes as well as many passes at once."""
+    whole = filmed(small_scene(), range(9), shader=shader, threads=1)
+    for threads, samples, pixels, seconds in ((2, 2**18, 8192, 1), (1, 100, 10, 1), (2, 100, 50, 0), (5, 10**6, 37, 9)):
+        monkeypatch.setattr(render, "_UNIT_SAMPLES", samples)
+        monkeypatch.setattr(render, "_LEAST_UNIT_PIXELS", pixels)
+        monkeypatch.setattr(render, "_UNIT_SECONDS", seconds)
+        assert same_bits(whole, filmed(small_scene(), range(9), shader=shader, threads=threads)), samples
 
 
 def test_passes_are_the_same_in_one_run_and_in_many():

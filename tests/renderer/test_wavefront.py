@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
 
-import renderer.wavefront
 from renderer.scene.description import (
     DirectionalLight,
     EnvironmentLight,
@@ -12,7 +11,7 @@ from renderer.scene.description import (
     RectangleLight,
     SphereLight,
 )
-from renderer.wavefront import Wavefront
+from renderer.tracing import roulette
 from sss_tools.shapes import box, icosphere, moved
 from tests.assertions import assert_mean, seed
 from tests.renderer.scenes import (
@@ -73,8 +72,7 @@ def test_picture_is_the_same_bit_for_bit_in_blocks_of_any_size(rendered, block):
     other = wavefront(described, seed=5, block=block).trace(3, 0, PIXELS)
     assert_array_equal(other.radiance, whole.radiance)
     assert_array_equal(other.first_object, whole.first_object)
-    # rays are not compared: dead paths keep their slots until the block is compacted
-    assert other.tally.collisions == whole.tally.collisions
+    assert other.tally == whole.tally
 
 
 @pytest.mark.parametrize("size", [1, 100, 1000])
@@ -127,23 +125,37 @@ def test_nothing_is_seen_of_objects_outside_the_view():
     assert_array_equal(shown.samples, np.ones((1, 3, 64)))
 
 
+@pytest.mark.parametrize("passes", [2, 5])
+def test_passes_taken_together_are_the_passes_taken_one_by_one(rendered, passes):
+    described, whole = rendered
+    together = wavefront(described, seed=5).trace(3, 100, 400, passes)
+    assert together.tally.samples == passes * 300
+    for k in range(passes):
+        alone = wavefront(described, seed=5).trace(3 + k, 100, 400)
+        radiance, first_object = together.of_pass(k)
+        assert_array_equal(radiance, alone.radiance)
+        assert_array_equal(first_object, alone.first_object)
+    assert_array_equal(together.of_pass(0)[0], whole.radiance[:, 100:400])
+
+
 # ---- roulette ----
 
 
-class Forgetful(Wavefront):
-    """Plays roulette and forgets to weigh the survivors up."""
+def forget_the_weight(patch: pytest.MonkeyPatch) -> None:
+    """Roulette that does not weigh the survivors up."""
 
-    def _roulette(self, collided):
-        before = self._paths.throughput.copy()
-        super()._roulette(collided)
-        self._paths.throughput[:] = before
+    def survive(paths, uniforms, index, chance):
+        u, _ = uniforms.draw_at(paths.stream, index)
+        paths.alive[index[u >= chance]] = False
+
+    patch.setattr(roulette, "_survive", survive)
 
 
-def absorbing_ball_means(number: int, kind: type[Wavefront] = Wavefront):
+def absorbing_ball_means(number: int):
     """Pass means over a ball of albedo 0.9, 0.85, 0.75 behind glass, filling the picture; and the tally."""
     view = camera((0, 0, 5), fov=16, resolution=(48, 48))
     ball = placed(icosphere(1, 4), translucent([0.9, 0.85, 0.75], 8.0, 0.0, 1.5))
-    shown = picture(scene([ball], [WHITE_SKY], view), 64, seed=seed(number), kind=kind)
+    shown = picture(scene([ball], [WHITE_SKY], view), 64, seed=seed(number))
     return [shown.pass_means(k) for k in range(3)], shown.tally
 
 
@@ -151,7 +163,7 @@ def absorbing_ball_means(number: int, kind: type[Wavefront] = Wavefront):
 def followed():
     """Paths followed until they leave."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(renderer.wavefront, "ROULETTE_BELOW", np.float32(0))
+        patch.setattr("renderer.tracing.paths.ROULETTE_BELOW", np.float32(0))
         return absorbing_ball_means(2)
 
 
@@ -163,8 +175,9 @@ def test_roulette_changes_costs_and_not_means(followed):
         assert_mean(one - other, 0, false_alarm=3e-4, detects=0.05 * other.mean())
 
 
-def test_roulette_without_its_weight_is_caught(followed):
-    played, _ = absorbing_ball_means(1, Forgetful)
+def test_roulette_without_its_weight_is_caught(followed, monkeypatch):
+    forget_the_weight(monkeypatch)
+    played, _ = absorbing_ball_means(1)
     with pytest.raises(AssertionError, match="wrong mean"):
         assert_mean(played[0] - followed[0][0], 0, false_alarm=3e-4, detects=0.05 * followed[0][0].mean())
 

@@ -4,9 +4,24 @@ import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
 
-from renderer.tracing.paths import OUTSIDE, Paths
+from renderer.tracing.paths import OUTSIDE, WHOLE, Paths
 
-COLUMNS = ("origin", "direction", "throughput", "stream", "sample", "inside", "owner", "scattered", "lit", "surfaces")
+COLUMNS = (
+    *(
+        "origin",
+        "direction",
+        "throughput",
+        "faint",
+        "axis",
+        "stream",
+        "sample",
+        "triangle",
+        "inside",
+        "owner",
+        "scattered",
+    ),
+    *("lit", "branch", "surfaces"),
+)
 
 
 def filled(capacity: int, count: int, translucent: int = 2) -> Paths:
@@ -15,7 +30,9 @@ def filled(capacity: int, count: int, translucent: int = 2) -> Paths:
     number = np.arange(count)
     coordinates = number + 1000.0 * np.arange(3)[:, None]
     paths.emit(coordinates, -coordinates, number.astype(np.uint64) + np.uint64(7), number)
-    paths.throughput[:] = coordinates / 7
+    paths.throughput[:], paths.axis[:], paths.triangle[:] = coordinates / 7, coordinates / 3, 2 * number
+    paths.faint[:] = number / 64
+    paths.branch[:] = number % 4
     paths.inside[:] = number % 5 + np.arange(max(translucent, 1))[:, None]
     paths.owner[:], paths.surfaces[:] = number % 3 - 1, number % 11
     paths.scattered[:], paths.lit[:] = number % 2, number % 3 == 0
@@ -38,22 +55,53 @@ def test_new_paths_start_outside_with_all_their_light():
     assert_array_equal(paths.surfaces, [0, 0, 0])
 
 
-def test_compacting_keeps_the_living_in_their_order():
+def by_sample(columns: dict) -> dict:
+    """The columns ordered by sample: their order among the paths means nothing."""
+    order = np.argsort(columns["sample"])
+    return {name: column[..., order] for name, column in columns.items()}
+
+
+@pytest.mark.parametrize("share", [0.0, 0.1, 0.4, 0.9, 1.0])
+def test_burying_keeps_the_living_whole(share):
     paths = filled(50, 40)
     before = contents(paths)
-    dead = np.random.default_rng(1).random(40) < 0.4
+    dead = np.random.default_rng(1).random(40) < share
     paths.alive[dead] = False
-    paths.compact()
+    paths.bury()
     assert paths.count == np.count_nonzero(~dead)
     assert paths.alive.all()
+    after = by_sample(contents(paths))
     for name in COLUMNS:
-        assert_array_equal(getattr(paths, name), before[name][..., ~dead], err_msg=name)
+        assert_array_equal(after[name], before[name][..., ~dead], err_msg=name)
 
 
-def test_emitting_after_compacting_leaves_the_others_alone():
+@pytest.mark.parametrize("index", [[], [0], [39], [0, 1, 2], [37, 38, 39], [3, 20, 38], list(range(40))])
+def test_moved_paths_are_in_the_other_place_and_no_longer_in_the_first(index):
+    paths, others = filled(50, 40), filled(60, 5)
+    before, there = contents(paths), contents(others)
+    where = paths.move(np.array(index, np.intp), others)
+    assert (where.start, where.stop) == (5, 5 + len(index))
+    stays = np.setdiff1d(np.arange(40), index)
+    after = by_sample(contents(paths))
+    for name in COLUMNS:
+        assert_array_equal(after[name], before[name][..., stays], err_msg=name)
+        assert_array_equal(getattr(others, name)[..., :5], there[name], err_msg=name)
+        assert_array_equal(getattr(others, name)[..., 5:], before[name][..., index], err_msg=name)
+
+
+def test_appended_copies_leave_the_others_alone_and_may_be_of_the_same_paths():
+    paths = filled(50, 20)
+    before = contents(paths)
+    where = paths.append(paths, np.array([2, 7, 19]))
+    for name in COLUMNS:
+        assert_array_equal(getattr(paths, name)[..., :20], before[name], err_msg=name)
+        assert_array_equal(getattr(paths, name)[..., where], before[name][..., [2, 7, 19]], err_msg=name)
+
+
+def test_emitting_after_a_burial_leaves_the_others_alone():
     paths = filled(20, 20)
     paths.alive[::2] = False
-    paths.compact()
+    paths.bury()
     before = contents(paths)
     paths.emit(np.zeros((3, 5)), np.ones((3, 5)), np.zeros(5, np.uint64), np.arange(5))
     assert paths.count == 15
@@ -62,27 +110,8 @@ def test_emitting_after_compacting_leaves_the_others_alone():
     # what the dead left behind does not show in the new
     assert_array_equal(paths.inside[:, 10:], np.zeros((2, 5)))
     assert_array_equal(paths.owner[10:], [OUTSIDE] * 5)
+    assert_array_equal(paths.branch[10:], [WHOLE] * 5)
     assert paths.alive.all()
-
-
-@pytest.mark.parametrize("alive", [True, False])
-def test_all_or_none_may_live(alive):
-    paths = filled(10, 10)
-    before = contents(paths)
-    paths.alive[:] = alive
-    paths.compact()
-    assert paths.count == (10 if alive else 0)
-    if alive:
-        for name in COLUMNS:
-            assert_array_equal(getattr(paths, name), before[name])
-
-
-def test_changes_to_the_columns_are_changes_to_the_paths():
-    paths = filled(10, 6)
-    paths.origin[:, 2] = 5
-    paths.alive[0] = False
-    paths.compact()
-    assert_array_equal(paths.origin[:, 1], [5, 5, 5])
 
 
 def test_more_paths_than_slots_are_refused():
@@ -101,5 +130,5 @@ def test_cleared_paths_are_gone():
 def test_scenes_without_media_work_too():
     paths = filled(4, 4, translucent=0)
     paths.alive[1] = False
-    paths.compact()
+    paths.bury()
     assert paths.count == 3

@@ -1,0 +1,45 @@
+"""Russian roulette: faint paths end, and those that survive make up for them."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .paths import Paths
+from .streams import Uniforms
+
+_FREE_SURFACES, _MANY_SURFACES = 3, 256
+_LASTING = np.float32(0.9)
+
+
+def play_at_collisions(paths: Paths, uniforms: Uniforms) -> None:
+    """Paths below their threshold f survive with probability w/(2 f), w their largest channel, then weigh 2 f."""
+    largest = np.maximum.reduce(paths.throughput, axis=0)
+    index = (largest < paths.faint).nonzero()[0]
+    _survive(paths, uniforms, index, largest[index] / (2 * paths.faint[index]))
+
+
+def play_at_surfaces(paths: Paths, uniforms: Uniforms) -> None:
+    """The same from the fourth surface in a row on, so that a single reflection stays free of noise.
+
+    Light that 256 surfaces keep inside a clear body without a collision would circle for ever: it goes on with
+    probability 0.9 a time.
+    """
+    index = np.flatnonzero(paths.surfaces > _FREE_SURFACES)
+    if not len(index):
+        return
+    largest, faint = np.maximum.reduce(paths.throughput[:, index], axis=0), paths.faint[index]
+    chance = np.where(largest < faint, largest / (2 * np.maximum(faint, np.float32(1e-30))), 1)
+    np.minimum(chance, _LASTING, out=chance, where=paths.surfaces[index] > _MANY_SURFACES)
+    endangered = chance < 1
+    _survive(paths, uniforms, index[endangered], chance[endangered])
+
+
+def _survive(paths: Paths, uniforms: Uniforms, index: NDArray[np.intp], chance: NDArray[np.float32]) -> None:
+    """Let the paths ``index`` live with the given probability, and divide by it."""
+    if not len(index):
+        return
+    u, _ = uniforms.draw_at(paths.stream, index)
+    lives = u < chance
+    paths.alive[index[~lives]] = False
+    paths.throughput[:, index[lives]] /= chance[lives]
