@@ -20,6 +20,7 @@ from .shaders.boundary import meet_boundary, split
 from .shaders.fast_body import FastBody
 from .shaders.opaque import meet_diffuse, meet_mirror
 from .shaders.path import MediumWalk
+from .tracing.acceleration import Acceleration
 from .tracing.paths import Paths
 from .tracing.roulette import play_at_surfaces
 from .tracing.streams import Uniforms, stream_keys
@@ -58,7 +59,8 @@ class Samples:
 class Wavefront:
     """Traces camera samples; one instance a thread.
 
-    fast_bodies  the objects that a shader other than path lights, by object index
+    fast_bodies   the objects that a shader other than path lights, by object index
+    acceleration  what makes walks shorter or cheaper and leaves their mean alone
 
     A path is in one of several places: flying outside, standing on a surface, or in one of the media. Each step
     takes all paths of the fullest place one event further.
@@ -71,13 +73,17 @@ class Wavefront:
         fast_bodies: Mapping[int, FastBody],
         seed: int,
         block: int = BLOCK,
+        acceleration: Acceleration | None = None,
     ):
         self.scene, self.camera, self.seed = scene, camera, seed
         block = max(block, 2)  # a path and its branch
         self._uniforms = Uniforms(block)
         self._tally = Tally()
         self._flying, self._standing = (Paths(block, scene.media.count) for _ in range(2))
-        self._walks = [MediumWalk(scene, slot, block, self._uniforms, self._tally) for slot in range(scene.media.count)]
+        self._walks = [
+            MediumWalk(scene, slot, block, self._uniforms, self._tally, acceleration)
+            for slot in range(scene.media.count)
+        ]
         self._fast_bodies = fast_bodies
         # how each object answers a ray, for scenes with more than one kind of surface
         self._kind = [thing.shader for thing in scene.objects]
@@ -101,12 +107,14 @@ class Wavefront:
         for place in (self._flying, self._standing):
             place.clear()
         for walk in self._walks:
-            walk.clear()
+            walk.paths.clear()
         emitted = 0
         while True:
             # every path outside may still split in two
             branches = 2 if self._walks else 1
-            taken = branches * (self._flying.count + self._standing.count) + sum(walk.count for walk in self._walks)
+            taken = branches * (self._flying.count + self._standing.count) + sum(
+                walk.paths.count for walk in self._walks
+            )
             if emitted < count and taken <= self._flying.capacity * _REFILL_AT:
                 new = min((self._flying.capacity - taken) // branches, count - emitted)
                 self._emit(emitted, new)
@@ -132,8 +140,7 @@ class Wavefront:
         """Take the paths of the fullest place one event further."""
         places = [(self._flying.count, self._fly), (self._standing.count, self._stand)]
         for walk in self._walks:
-            places.append((walk.entering.count, partial(walk.fly_on, self._standing, self._radiance)))
-            places.append((walk.colliding.count, partial(walk.scatter, self._standing, self._radiance)))
+            places.append((walk.paths.count, partial(walk.step, self._standing, self._radiance)))
         _, step = max(places, key=itemgetter(0))
         step()
 
@@ -164,8 +171,9 @@ class Wavefront:
         paths.bury()
         for slot, walk in enumerate(self._walks):
             inside = np.flatnonzero(paths.owner == slot)
-            where = paths.move(inside, walk.entering)
-            walk.entering.axis[:, where] = self.scene.triangle_normal.take(walk.entering.triangle[where], axis=1)
+            entered = paths.move(inside, walk.paths)
+            walk.paths.axis[:, entered] = self.scene.triangle_normal.take(walk.paths.triangle[entered], axis=1)
+            walk.paths.flies_on[entered] = True
         paths.move(np.arange(paths.count), self._flying)
 
     def _meet(self) -> None:

@@ -44,7 +44,8 @@ class Guide:
         1 / [1 - m + m r (1 - c/nu0) e^(sigma_t s c/nu0)]   if it ends in a collision,
         1 / [1 - m + m r e^(sigma_t s c/nu0)]               if it ends at a surface,
 
-    r = p(c) / (2 pi) over the phase function, whose albedo the caller multiplies with. No weight exceeds 1/(1 - m).
+    r = 2 p(c), the density over that of isotropic scattering; the caller multiplies with the albedo. No weight exceeds
+    1/(1 - m).
 
     nu0      decay length in mean free paths, see ``decay_length``
     share    m, in (0, 1)
@@ -83,18 +84,13 @@ class Guide:
         """(n,) extinction of guided flights over that of plain ones."""
         return 1 - cosine * np.float32(1 / self.nu0)
 
-    def weight(self, cosine: Float32, phase: Float32 | None, flight: Float32, at_surface: NDArray[np.intp]) -> Float32:
-        """(n,) weights of flights; ``at_surface`` are those that end at surfaces, the others end in collisions.
-
-        phase  (n,) phase function of each turn, per steradian; None where it is 1/(4 pi)
-        """
+    def weight(self, cosine: Float32, flight: Float32, at_surface: NDArray[np.intp]) -> Float32:
+        """(n,) weights of flights (n,); ``at_surface`` are those that end at surfaces, the others end in collisions."""
         exponent = cosine * np.float32(self.sigma_t / self.nu0)
         exponent *= flight
         growth = np.exp(np.minimum(exponent, _LARGEST_EXPONENT, out=exponent), out=exponent)
-        # r (1 - c/nu0) does not depend on c where scattering is isotropic
+        # at collisions r (1 - c/nu0) does not depend on c
         growth *= np.float32(self.share * 2 / (self.nu0 * self._log))
-        if phase is not None:
-            growth /= np.float32(4 * np.pi) * phase
         growth[at_surface] /= self.rate(cosine[at_surface])
         growth += np.float32(1 - self.share)
         return np.reciprocal(growth, out=growth)

@@ -22,7 +22,9 @@ from ..optics.free_flight import (
     surface_weight,
 )
 from ..optics.guided_flight import Guide
-from ..optics.phase import around, henyey_greenstein, sample_henyey_greenstein, spherical
+from ..optics.phase import around, sample_henyey_greenstein, spherical
+from ..tracing.acceleration import Acceleration
+from ..tracing.distance_grid import Scratch
 from ..tracing.paths import CHANCE, Paths
 from ..tracing.roulette import play_at_collisions
 from ..tracing.streams import Uniforms
@@ -39,8 +41,7 @@ Float32 = NDArray[np.float32]
 class MediumWalk:
     """One worker's paths inside one object's medium, up to ``capacity`` of them.
 
-    entering   paths that fly on in the direction they have
-    colliding  paths that stand at a collision and are to be scattered
+    Those that ``flies_on`` marks have a direction already; the others stand at a collision and are to be scattered.
     """
 
     def __init__(
@@ -50,10 +51,11 @@ class MediumWalk:
         capacity: int,
         uniforms: Uniforms,
         tally: Tally,
-        guide: Guide | None = None,
+        acceleration: Acceleration,
     ):
-        self.scene, self.slot, self.tally, self.guide = scene, slot, tally, guide
-        self.entering, self.colliding = (Paths(capacity, scene.media.count) for _ in range(2))
+        self.scene, self.slot, self.tally = scene, slot, tally
+        self.paths = Paths(capacity, scene.media.count)
+        self._guide, self._jumps, self._grid = acceleration.guides[slot], acceleration.jumps[slot], acceleration.grid
         media = scene.media
         self._sigma_t, self._sigma_s = media.sigma_t[:, slot, None], media.sigma_s[:, slot, None]
         self._albedo = media.albedo[:, slot, None]
@@ -65,127 +67,150 @@ class MediumWalk:
         self._centre = (thing.lower + thing.upper) / 2
         self._half = (thing.upper - thing.lower) / 2 + RAY_OFFSET
         self._uniforms = uniforms
-        self._flight = np.empty(capacity, np.float32)
+        self._flight, self._bound = np.empty((2, capacity), np.float32)
         self._turned = np.empty((3, capacity), np.float32)
+        self._scratch = Scratch(capacity)
+        self._jumps_from = np.float32(self._jumps.pays_from() if self._jumps else np.inf)
 
-    @property
-    def count(self) -> int:
-        """Paths in this medium."""
-        return self.entering.count + self.colliding.count
-
-    def clear(self) -> None:
-        """Forget all paths."""
-        self.entering.clear()
-        self.colliding.clear()
-
-    def fly_on(self, standing: Paths, radiance: Float32) -> None:
-        """Take the entering paths to their first collision; those that meet a surface first go to ``standing``."""
-        paths = self.entering
-        u, choice, _ = self._uniforms.draw_three(paths.stream)
-        flight = exponential(u, self._flight[: paths.count])
-        self._finish(paths, flight, choice, None, standing, radiance)
-        self.colliding.append(paths, np.arange(paths.count))
-        paths.clear()
-
-    def scatter(self, standing: Paths, radiance: Float32) -> None:
-        """Scatter the colliding paths and take them to their next collision, or to ``standing``."""
-        paths = self.colliding
-        self.tally.collisions += paths.count
-        if self._lit_inside:
-            point_light.light_collisions(self.scene, paths, self.slot, self.tally, radiance)
-        play_at_collisions(paths, self._uniforms)
-        paths.bury()
+    def step(self, standing: Paths, radiance: Float32) -> None:
+        """Scatter the paths and take them to their next collision; those that meet a surface go to ``standing``."""
+        paths = self.paths
+        self._end_or_light(radiance)
+        bound = self._reach(paths.origin)
+        if self._jumps is not None and bound is not None:
+            self._jump(bound)
         u, u_cosine, u_turn = self._uniforms.draw_three(paths.stream)
         flight = exponential(u, self._flight[: paths.count])
-        turned, stretch = self._turned[:, : paths.count], None
-        choice = u_cosine
-        if self.guide is None:
-            if not self._achromatic:
-                choice, _ = self._uniforms.draw(paths.stream)
-            spherical(sample_henyey_greenstein(self._g, u_cosine), u_turn, turned)
+        weigh = None
+        if self._guide is None:
+            turned = spherical(sample_henyey_greenstein(self._g, u_cosine), u_turn, self._turned[:, : paths.count])
             if self._g != 0:
                 turned = around(paths.direction, turned)
         else:
-            turned, stretch = self._scatter_guided(paths, u_cosine, u_turn, flight)
-        np.copyto(paths.direction, turned)
-        self._finish(paths, flight, choice, stretch, standing, radiance)
-
-    def _scatter_guided(self, paths: Paths, u_cosine: Float32, u_turn: Float32, flight: Float32):
-        """New directions, and what the guide's weights need: see ``Guide``. Stretches the flights drawn."""
-        guide, local = self.guide, self._turned[:, : paths.count]
-        assert guide is not None
-        guided = u_cosine < guide.share
-        u = np.where(guided, u_cosine * guide.inverse_share, (u_cosine - guide.share) * guide.inverse_rest)
-        cosine = np.where(guided, guide.sample_cosine(u), sample_henyey_greenstein(self._g, u))
-        spherical(cosine, u_turn, local)
-        axis = paths.axis
-        if self._g != 0:
-            axis = np.where(guided, axis, paths.direction)
-        turned = around(axis, local)
-        phase = None
-        if self._g != 0:
-            cosine = np.einsum("ij,ij->j", paths.axis, turned)
-            phase = henyey_greenstein(np.einsum("ij,ij->j", paths.direction, turned), self._g).astype(np.float32)
-        np.divide(flight, guide.rate(cosine), out=flight, where=guided)
-        return turned, (cosine, phase)
-
-    def _finish(
-        self,
-        paths: Paths,
-        flight: Float32,
-        choice: Float32,
-        guided: tuple[Float32, Float32 | None] | None,
-        standing: Paths,
-        radiance: Float32,
-    ) -> None:
-        """Fly ``flight`` (n,) mean free paths, or to the next surface, and weigh."""
-        chances = None
-        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-            if self._achromatic:
-                flight /= self._sigma_t[0]
-            else:
-                chances = channel_probabilities(paths.throughput, self._albedo)
-                flight /= self._sigma_t[choose_channel(chances, choice), 0]
-        np.copyto(flight, MISS, where=~(flight < MISS))
-        arrived, triangle = self._travel(paths, flight)
-        if guided is not None and self.guide is not None:
-            paths.throughput *= self.guide.weight(*guided, flight, arrived)
-        if chances is not None:
-            reach = np.where(flight < MISS, flight, 0)
-            factor = collision_weight(reach, self._sigma_s, self._sigma_t, chances)
-            factor[:, arrived] = surface_weight(reach[arrived], self._sigma_t, chances[:, arrived])
-            paths.throughput *= factor
+            turned, weigh = self._turn_guided(self._guide, u_cosine, u_turn, flight)
+        np.copyto(paths.direction, turned, where=~paths.flies_on)
+        if self._achromatic:
+            arrived, triangle = self._fly_achromatic(flight, bound)
+        else:
+            arrived, triangle = self._fly_chromatic(flight, bound)
+        if weigh is not None:
+            paths.throughput *= weigh(flight, arrived)
         paths.triangle[arrived] = triangle
         paths.move(arrived, standing)
-        if chances is None:
+        if self._achromatic:
             # the flight's density cancels extinction; what is left at a collision is the albedo
             paths.throughput *= self._albedo
+        paths.flies_on[:] = False
         paths.scattered[:] = True
         paths.lit[:] = False
         paths.surfaces[:] = 0
         paths.branch[:] = CHANCE
-        self._lose_leaked(paths, radiance)
+        self._lose_leaked(radiance)
 
-    def _travel(self, paths: Paths, flight: Float32) -> tuple[NDArray[np.intp], NDArray[np.int32]]:
+    def _end_or_light(self, radiance: Float32) -> None:
+        """At the collisions: next-event estimation, then roulette."""
+        paths = self.paths
+        collided = ~paths.flies_on
+        self.tally.collisions += int(np.count_nonzero(collided))
+        if self._lit_inside:
+            point_light.light_collisions(self.scene, paths, collided.nonzero()[0], self.slot, self.tally, radiance)
+        play_at_collisions(paths, self._uniforms)
+        paths.bury()
+
+    def _reach(self, position: Float32) -> Float32 | None:
+        """(n,) how far around the positions (3, n) there is no surface for sure; None where nothing is known."""
+        if self._grid is None:
+            return None
+        return self._grid.distance(position, self._bound[: position.shape[1]], self._scratch)
+
+    def _jump(self, bound: Float32) -> None:
+        """Take the paths that are deep inside to the surface of a ball around them, and update their ``bound``."""
+        paths = self.paths
+        deep = ((bound >= self._jumps_from) & ~paths.flies_on).nonzero()[0]
+        if not len(deep):
+            return
+        assert self._jumps is not None and self._grid is not None
+        uniforms = [*self._uniforms.draw_at(paths.stream, deep), *self._uniforms.draw_at(paths.stream, deep)]
+        position, direction = paths.origin[:, deep], np.empty((3, len(deep)), np.float32)
+        which = self._jumps.index_of(bound[deep])
+        paths.throughput[:, deep] *= self._jumps.jump(which, uniforms, position, direction)
+        paths.origin[:, deep], paths.direction[:, deep] = position, direction
+        paths.flies_on[deep] = True
+        bound[deep] = self._grid.distance(position, np.empty(len(deep), np.float32), self._scratch)
+
+    def _turn_guided(self, guide: Guide, u_cosine: Float32, u_turn: Float32, flight: Float32):
+        """New directions, and what gives the flights' weights. Stretches those of ``flight`` that are guided."""
+        paths, local = self.paths, self._turned[:, : self.paths.count]
+        guided = u_cosine < guide.share
+        u = np.where(guided, u_cosine * guide.inverse_share, (u_cosine - guide.share) * guide.inverse_rest)
+        cosine = np.where(guided, guide.sample_cosine(u), 2 * u - 1)
+        turned = around(paths.axis, spherical(cosine, u_turn, local))
+        stays = paths.flies_on.copy()
+        guided &= ~stays
+        np.divide(flight, guide.rate(cosine), out=flight, where=guided)
+
+        def weigh(flown: Float32, arrived: NDArray[np.intp]) -> Float32:
+            weight = guide.weight(cosine, flown, arrived)
+            np.copyto(weight, 1, where=stays)
+            return weight
+
+        return turned, weigh
+
+    def _fly_achromatic(self, flight: Float32, bound: Float32 | None):
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+            flight /= self._sigma_t[0]
+        np.copyto(flight, MISS, where=~(flight < MISS))
+        return self._travel(flight, bound)
+
+    def _fly_chromatic(self, flight: Float32, bound: Float32 | None):
+        """Draw the flight for one channel and weigh all by the balance heuristic."""
+        paths = self.paths
+        choice, _ = self._uniforms.draw(paths.stream)
+        chances = channel_probabilities(paths.throughput, self._albedo)
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+            flight /= self._sigma_t[choose_channel(chances, choice), 0]
+        np.copyto(flight, MISS, where=~(flight < MISS))
+        arrived, triangle = self._travel(flight, bound)
+        reach = np.where(flight < MISS, flight, 0)
+        factor = collision_weight(reach, self._sigma_s, self._sigma_t, chances)
+        factor[:, arrived] = surface_weight(reach[arrived], self._sigma_t, chances[:, arrived])
+        paths.throughput *= factor
+        return arrived, triangle
+
+    def _travel(self, flight: Float32, bound: Float32 | None) -> tuple[NDArray[np.intp], NDArray[np.int32]]:
         """Move the paths, shortening ``flight`` in place to where they meet a surface: which, and its triangle.
 
         Triangle -2 - k is the k-th sphere light.
         """
-        distance, triangle = self.scene.closest(paths.origin, paths.direction, flight)
-        self.tally.rays += paths.count
+        paths = self.paths
+        if bound is None:
+            distance, triangle = self._closest(paths.origin, paths.direction, flight)
+            flight[:] = distance
+            arrived = (triangle != -1).nonzero()[0]
+            triangle = triangle[arrived]
+        else:
+            near = (flight >= bound).nonzero()[0]
+            distance, triangle = self._closest(paths.origin[:, near], paths.direction[:, near], flight[near])
+            flight[near] = distance
+            hit = (triangle != -1).nonzero()[0]
+            arrived, triangle = near[hit], triangle[hit]
+        step = np.multiply(paths.direction, flight, out=self._turned[:, : paths.count])
+        np.add(paths.origin, step, out=paths.origin)
+        return arrived, triangle
+
+    def _closest(self, origin: Float32, direction: Float32, limit: Float32) -> tuple[Float32, NDArray[np.int32]]:
+        distance, triangle = self.scene.closest(origin, direction, limit)
+        self.tally.rays += len(limit)
         for k, sphere in enumerate(self.scene.lights.spheres):
-            reach = sphere.distance(paths.origin, paths.direction)
+            reach = sphere.distance(origin, direction)
             nearer = reach < distance
             np.copyto(distance, reach, where=nearer)
             np.copyto(triangle, np.int32(-2 - k), where=nearer)
-        arrived = np.flatnonzero(triangle != -1)
-        flight[:] = distance
-        step = np.multiply(paths.direction, flight, out=self._turned[:, : paths.count])
-        np.add(paths.origin, step, out=paths.origin)
-        return arrived, triangle[arrived]
+        return distance, triangle
 
-    def _lose_leaked(self, paths: Paths, radiance: Float32) -> None:
+    def _lose_leaked(self, radiance: Float32) -> None:
         """End paths that collide outside their object's bounding box: they have slipped through its surface."""
+        paths = self.paths
         off = np.subtract(paths.origin, self._centre, out=self._turned[:, : paths.count])
         np.abs(off, out=off)
         # written so that positions that are not numbers count as outside

@@ -23,21 +23,24 @@ from .local_frame import LocalFrame
 Float32 = NDArray[np.float32]
 
 
-def light_collisions(scene: TracedScene, paths: Paths, slot: int, tally: Tally, radiance: Float32) -> None:
-    """Light the paths, all at collisions in the medium ``slot``, which lies behind an invisible boundary.
+def light_collisions(
+    scene: TracedScene, paths: Paths, index: NDArray[np.intp], slot: int, tally: Tally, radiance: Float32
+) -> None:
+    """Light the collisions of the paths ``index`` in the medium ``slot``, which lies behind an invisible boundary.
 
         w p(mu) E0 exp(-optical depth), w with this collision's albedo
 
     ``paths.direction`` must still be the one before the collision.
     """
-    if not paths.count:
+    if not len(index):
         return
     media = scene.media
+    position, direction, sample = paths.origin[:, index], paths.direction[:, index], paths.sample[index]
     for source in scene.lights.points:
-        light = source.illuminate(paths.origin)
-        phase = henyey_greenstein(np.einsum("ij,ij->j", paths.direction, light.direction), media.g[slot])
-        visible = shadow_transmittance(scene, media, paths.origin, light, paths.inside, paths.owner, tally)
-        radiance[:, paths.sample] += paths.throughput * light.irradiance * (phase * visible)
+        light = source.illuminate(position)
+        phase = henyey_greenstein(np.einsum("ij,ij->j", direction, light.direction), media.g[slot])
+        visible = shadow_transmittance(scene, media, position, light, paths.inside[:, index], paths.owner[index], tally)
+        radiance[:, sample] += paths.throughput[:, index] * light.irradiance * (phase * visible)
 
 
 def light_rough(

@@ -31,6 +31,7 @@ class Paths:
     scattered   (n,) bool, whether the path has collided since a boundary last bent it inwards
     lit         (n,) bool, whether area lights were already sampled from the last vertex, so that meeting one
                 now must not count again
+    flies_on    (n,) bool, in media: whether the direction is that of the next flight, and not that before a collision
     branch      (n,) int8 what the path does at the next boundary, see ``WHOLE``
     surfaces    (n,) int16 surfaces met since the last collision
     alive       (n,) bool
@@ -51,6 +52,7 @@ class Paths:
             "owner": np.empty(capacity, np.int16),
             "scattered": np.empty(capacity, bool),
             "lit": np.empty(capacity, bool),
+            "flies_on": np.empty(capacity, bool),
             "branch": np.empty(capacity, np.int8),
             "surfaces": np.empty(capacity, np.int16),
             "alive": np.empty(capacity, bool),
@@ -71,7 +73,7 @@ class Paths:
         self.faint, self.stream, self.sample = store["faint"], store["stream"], store["sample"]
         self.triangle, self.inside, self.owner = store["triangle"], store["inside"], store["owner"]
         self.scattered, self.lit, self.branch = store["scattered"], store["lit"], store["branch"]
-        self.surfaces, self.alive = store["surfaces"], store["alive"]
+        self.flies_on, self.surfaces, self.alive = store["flies_on"], store["surfaces"], store["alive"]
 
     @property
     def free(self) -> int:
@@ -93,7 +95,7 @@ class Paths:
         store["faint"][new] = ROULETTE_BELOW
         store["inside"][:, new] = 0
         store["owner"][new] = OUTSIDE
-        store["scattered"][new] = store["lit"][new] = False
+        store["scattered"][new] = store["lit"][new] = store["flies_on"][new] = False
         store["branch"][new] = WHOLE
         store["surfaces"][new] = 0
         store["alive"][new] = True

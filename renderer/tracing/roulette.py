@@ -15,7 +15,7 @@ _LASTING = np.float32(0.9)
 def play_at_collisions(paths: Paths, uniforms: Uniforms) -> None:
     """Paths below their threshold f survive with probability w/(2 f), w their largest channel, then weigh 2 f."""
     largest = np.maximum.reduce(paths.throughput, axis=0)
-    index = (largest < paths.faint).nonzero()[0]
+    index = ((largest < paths.faint) & ~paths.flies_on).nonzero()[0]
     _survive(paths, uniforms, index, largest[index] / (2 * paths.faint[index]))
 
 
