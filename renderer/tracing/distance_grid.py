@@ -195,8 +195,8 @@ class DistanceGrid:
         sizes = np.bincount(regions, minlength=count + 1)
         sizes[0] = 0
         largest = np.argsort(-sizes)[: min(_LARGEST_REGIONS, count)]
-        voxel_of = np.zeros(count + 1, np.intp)
-        voxel_of[regions] = np.arange(regions.size)
+        voxel_of = np.zeros(count + 1, np.int32)
+        voxel_of[regions] = np.arange(regions.size, dtype=np.int32)
         winding = [winding_numbers(self.centres(voxel_of[largest]), points.astype(float), faces) for faces in solids]
         state_of = np.zeros(count + 1, np.int8)
         state_of[largest] = np.where((np.abs(winding) > 0.5).any(axis=0), INSIDE, OUTSIDE)

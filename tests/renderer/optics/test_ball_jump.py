@@ -8,6 +8,7 @@ from renderer.optics import ball_jump
 from renderer.optics.ball_exit import ball_exit
 from renderer.optics.ball_jump import BINS, ball_jumps, table_radii
 from renderer.optics.free_flight import channel_probabilities, choose_channel, collision_weight, surface_weight
+from sss_tools.cache import FOLDER_VARIABLE
 from tests.assertions import assert_mean, seed, shared_rate
 
 GREY = ([50.0] * 3, [0.99] * 3)
@@ -18,9 +19,10 @@ RATE = shared_rate(1e-3, 9)
 
 
 @pytest.fixture(scope="module", autouse=True)
-def small_tables():
+def small_tables(tmp_path_factory):
     """Up to 16 mean free paths: enough here, and quick to build."""
     with pytest.MonkeyPatch.context() as patch:
+        patch.setenv(FOLDER_VARIABLE, str(tmp_path_factory.mktemp("cache")))
         patch.setattr(ball_jump, "_COUNT", 17)
         patch.setattr(ball_jump, "LARGEST", 16.0)
         ball_jump._tables.cache_clear()
