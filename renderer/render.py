@@ -26,6 +26,7 @@ from .shaders import FAST_SHADERS, diffuse, selection
 from .shaders.fast_body import FastBody
 from .shaders.selection import DEFAULT_QUALITY, Plan
 from .shaders.surface import BodyOptics
+from .tracing.acceleration import Acceleration
 from .tracing.memory import keep_freed_memory
 from .tracing.tally import Tally
 from .tracing.traced_scene import TracedObject, TracedScene
@@ -35,9 +36,11 @@ SHADER_ID = {"path": 0, "plumb": 1, "scalar": 2, "diffuse": 3}
 """In pictures; opaque objects and the background have -1."""
 _UNIT_SAMPLES = 2**18
 """Camera samples of a work unit, at most. The last paths of a unit walk on in ever smaller company, up to a thousand
-steps in dense media, so units are as large as ``_UNIT_SECONDS`` allow; small pictures take many passes at once."""
-_UNIT_SECONDS = 1.0
+steps in dense media, so units grow while they take less than ``_UNIT_SECONDS``; small pictures take many passes at
+once."""
+_UNIT_SECONDS = 2.0
 _LEAST_UNIT_PIXELS = 8192
+_FIRST_SAMPLES = 2**13
 
 
 @dataclass(frozen=True)
@@ -98,6 +101,8 @@ class Renderer:
             )
             self.camera = CameraRays(scene.camera, self.traced.frame)
             self._fast_bodies = _fast_bodies(self.traced)
+            width, height = scene.camera.resolution
+            self.acceleration = Acceleration.chosen(self.traced, width * height)
             self.shader_id, self.object_id = self._identify()
         self.film = Film.blank(scene.camera.resolution, planned_hash(scene, self.plans), settings.seed)
         # their buffers outlive the threads of one ``run``
@@ -119,12 +124,11 @@ class Renderer:
         begun: deque[_Batch] = deque()
         waiting = iter(passes)
         with self.stages.stage("render"), ThreadPoolExecutor(threads) as pool:
-            start, finished = time.perf_counter(), 0
+            pace = _Pace(max(_FIRST_SAMPLES // (self.camera.resolution[0] * self.camera.resolution[1]), 1))
             try:
                 while True:
                     # enough units under way that no thread waits for the slowest unit of a pass
                     while sum(not unit.done() for batch in begun for unit in batch.units) < 2 * threads:
-                        pace = (time.perf_counter() - start) / finished if finished else None
                         numbers = list(islice(waiting, self._passes_at_once(pace, seconds_left)))
                         if not numbers:
                             break
@@ -133,9 +137,9 @@ class Renderer:
                         return
                     batch = begun.popleft()
                     samples = [unit.result() for unit in batch.units]
+                    pace.learn(len(batch.passes), max(unit.seconds for unit in samples))
                     for k, index in enumerate(batch.passes):
                         self._add(samples, k, index)
-                        finished += 1
                         if done is not None and done(index):
                             return
             finally:
@@ -143,13 +147,15 @@ class Renderer:
                     for unit in batch.units:
                         unit.cancel()
 
-    def _passes_at_once(self, pace: float | None, seconds_left: Callable[[], float] | None) -> int:
-        """How many passes a unit takes, where one takes ``pace`` seconds; one until that is known."""
+    def _passes_at_once(self, pace: _Pace, seconds_left: Callable[[], float] | None) -> int:
+        """How many passes the next unit takes."""
         width, height = self.scene.camera.resolution
-        if pace is None or self._fast_bodies:
+        if self._fast_bodies:
             return 1
-        seconds = _UNIT_SECONDS if seconds_left is None else min(_UNIT_SECONDS, seconds_left() / 8)
-        return int(np.clip(min(seconds / max(pace, 1e-9), _UNIT_SAMPLES / (width * height)), 1, _UNIT_SAMPLES))
+        passes = pace.next_passes()
+        if seconds_left is not None:
+            passes = min(passes, pace.passes_in(seconds_left() / 4))
+        return max(min(passes, _UNIT_SAMPLES // (width * height)), 1)
 
     def _begin(self, pool: ThreadPoolExecutor, passes: range, threads: int) -> _Batch:
         """Submit the units of some passes: whole pictures where there are many passes, else parts of one."""
@@ -173,9 +179,14 @@ class Renderer:
         try:
             wavefront = self._idle.get_nowait()
         except Empty:
-            wavefront = Wavefront(self.traced, self.camera, self._fast_bodies, self.settings.seed)
+            wavefront = Wavefront(
+                self.traced, self.camera, self._fast_bodies, self.settings.seed, acceleration=self.acceleration
+            )
         try:
-            return wavefront.trace(first_pass, first, last, passes)
+            start = time.perf_counter()
+            samples = wavefront.trace(first_pass, first, last, passes)
+            samples.seconds = time.perf_counter() - start
+            return samples
         finally:
             self._idle.put(wavefront)
 
@@ -211,6 +222,28 @@ class _Batch:
 
     passes: range
     units: list[Future[Samples]]
+
+
+class _Pace:
+    """How many passes to take at once: more and more, while units are short.
+
+    Four times the passes take far less than four times as long while the last paths of a unit walk alone.
+    """
+
+    def __init__(self, first: int):
+        self._passes, self._seconds = first, 0.0
+
+    def learn(self, passes: int, seconds: float) -> None:
+        """A unit of so many passes took so long."""
+        self._passes, self._seconds = max(passes, self._passes), seconds
+
+    def next_passes(self) -> int:
+        """Of the next unit."""
+        return self._passes * (4 if 0 < self._seconds < _UNIT_SECONDS else 1)
+
+    def passes_in(self, seconds: float) -> int:
+        """How many fit into a time for sure."""
+        return int(self._passes * seconds / self._seconds) if self._seconds else 1
 
 
 def _consecutive(numbers: list[int]) -> Iterator[range]:

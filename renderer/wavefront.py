@@ -42,12 +42,14 @@ class Samples:
     radiance      (3, passes * pixels) float32
     first_object  (passes * pixels,) int16 object that the sample met first, -1 for none
     passes        how many
+    seconds       wall time it took
     """
 
     radiance: Float32
     first_object: NDArray[np.int16]
     passes: int = 1
     tally: Tally = field(default_factory=Tally)
+    seconds: float = 0.0
 
     def of_pass(self, k: int) -> tuple[Float32, NDArray[np.int16]]:
         """Radiance and first object of the k-th pass."""
@@ -80,9 +82,9 @@ class Wavefront:
         self._uniforms = Uniforms(block)
         self._tally = Tally()
         self._flying, self._standing = (Paths(block, scene.media.count) for _ in range(2))
+        chosen = acceleration or Acceleration.none(scene.media.count)
         self._walks = [
-            MediumWalk(scene, slot, block, self._uniforms, self._tally, acceleration)
-            for slot in range(scene.media.count)
+            MediumWalk(scene, slot, block, self._uniforms, self._tally, chosen) for slot in range(scene.media.count)
         ]
         self._fast_bodies = fast_bodies
         # how each object answers a ray, for scenes with more than one kind of surface

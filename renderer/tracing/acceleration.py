@@ -1,6 +1,7 @@
-"""What makes walks in media shorter or cheaper, and leaves the expected picture alone; chosen from the scene alone.
+"""What makes walks in media shorter or cheaper, and leaves the expected picture alone.
 
-Samples must not depend on how many passes are asked for, or parts rendered apart would not add up bit for bit.
+Chosen from the scene alone: samples must not depend on how many passes are asked for, or parts that are rendered apart
+would not add up bit for bit. How much each measure brings is measured by ``benchmarks/walks.py``.
 """
 
 from __future__ import annotations
@@ -14,8 +15,14 @@ from ..optics.guided_flight import Guide
 from .distance_grid import DistanceGrid, Walks, choose_resolution
 from .traced_scene import TracedObject, TracedScene
 
-JUMP_ALBEDO, JUMP_INRADIUS = 0.97, 10
+_TYPICAL_PASSES, _TYPICAL_SHARE = 64, 0.3
+"""How often a picture is sampled, and the share of it that shows an object, where set-up must be weighed against
+time saved."""
+JUMP_ALBEDO, JUMP_INRADIUS = 0.97, 10.0
 """Least albedo and mean inradius (mean free paths) of bodies in which ball jumps pay."""
+GUIDE_ALBEDO, STRONG_GUIDE_ALBEDO, STRONG_GUIDE_SIZE = 0.995, 0.98, 16.0
+"""Guided flights save up to two thirds of the work at albedo 0.6, nothing at 0.998. Three of four flights are guided,
+and not two, where light that goes deep (bodies of many mean free paths) and comes back (albedo) does not matter."""
 
 
 @dataclass(frozen=True)
@@ -35,3 +42,65 @@ class Acceleration:
     def none(cls, media: int) -> Acceleration:
         """Plain walks."""
         return cls(None, (None,) * media, (None,) * media)
+
+    @classmethod
+    def chosen(cls, scene: TracedScene, pixels: int) -> Acceleration:
+        """What pays in this scene, for pictures of so many pixels."""
+        dense = [_jumps_pay(scene, thing) for thing in scene.translucent]
+        grid = _grid(scene, [thing for thing, jumps in zip(scene.translucent, dense, strict=True) if jumps], pixels)
+        jumps = [
+            ball_jumps(thing.medium.sigma_t, thing.medium.single_scattering_albedo)
+            if grid is not None and jumps and thing.medium is not None
+            else None
+            for thing, jumps in zip(scene.translucent, dense, strict=True)
+        ]
+        return cls(grid, tuple(jumps), tuple(_guide(scene, thing) for thing in scene.translucent))
+
+
+def _jumps_pay(scene: TracedScene, thing: TracedObject) -> bool:
+    """Whether a body has many collisions, and none of them is connected to a light."""
+    medium = thing.medium
+    assert medium is not None
+    if medium.g != 0 or not medium.is_achromatic or scene.lights.points or scene.lights.spheres:
+        return False
+    mesh = scene.scene.objects[thing.index].mesh
+    inradius = 3 * abs(mesh.volume) / max(mesh.area, 1e-300) / scene.frame.scale
+    return bool(medium.single_scattering_albedo.max() >= JUMP_ALBEDO and inradius * medium.sigma_t[0] >= JUMP_INRADIUS)
+
+
+def _grid(scene: TracedScene, dense: list[TracedObject], pixels: int) -> DistanceGrid | None:
+    """The grid around the dense bodies; any surface of the scene may be the nearest."""
+    if not dense:
+        return None
+    walks, solids = [], []
+    for thing in dense:
+        mesh, medium = scene.scene.objects[thing.index].mesh, thing.medium
+        assert medium is not None
+        walks.append(
+            Walks(
+                count=_TYPICAL_PASSES * _TYPICAL_SHARE * pixels / len(dense),
+                area=mesh.area / scene.frame.scale**2,
+                volume=mesh.volume / scene.frame.scale**3,
+                mean_free_path=1 / float(medium.sigma_t[0]),
+                albedo=float(medium.single_scattering_albedo.max()),
+                ior=float(medium.ior),
+            )
+        )
+        solids.append(slice(thing.first_triangle, thing.first_triangle + len(mesh.faces)))
+    lower = np.min([thing.lower for thing in dense], axis=0)
+    upper = np.max([thing.upper for thing in dense], axis=0)
+    resolution = choose_resolution(walks, (upper - lower).ravel(), jumps=True)
+    return None if resolution is None else DistanceGrid(scene.vertices, scene.triangles, resolution, solids)
+
+
+def _guide(scene: TracedScene, thing: TracedObject) -> Guide | None:
+    """Guided flights, where light comes out of the medium as it went in: from lights all around, not from one point."""
+    medium = thing.medium
+    assert medium is not None
+    albedo = float(medium.single_scattering_albedo.mean())
+    sigma_t = float(medium.sigma_t[0])
+    if medium.g != 0 or not medium.is_achromatic or scene.lights.points or not 0 < albedo <= GUIDE_ALBEDO:
+        return None
+    size = float((thing.upper - thing.lower).max()) * sigma_t
+    strong = albedo < STRONG_GUIDE_ALBEDO and size >= STRONG_GUIDE_SIZE
+    return Guide.of(albedo, sigma_t, 0.75 if strong else 0.5)

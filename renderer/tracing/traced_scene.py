@@ -58,6 +58,8 @@ class TracedScene:
 
     Triangles of the objects come first, in scene order; those of rectangle lights come last.
 
+    vertices         (n, 3) float32
+    triangles        (t, 3) indices
     caster           the Embree scene
     triangle_object  (t,) int16 object index, -1 for lights
     triangle_normal  (3, t) float32 unit geometric normals, outward
@@ -89,6 +91,7 @@ class TracedScene:
         offsets = np.cumsum([0] + [len(block) for block in vertices[:-1]])
         all_vertices = np.concatenate(vertices).astype(np.float32)
         all_triangles = np.concatenate([block + offset for block, offset in zip(triangles, offsets, strict=True)])
+        self.vertices, self.triangles = all_vertices, all_triangles
         self.triangle_object = np.concatenate(owners).astype(np.int16)
         # from the rounded vertices, which are what Embree sees
         corners = all_vertices.astype(np.float64)[all_triangles]

@@ -94,12 +94,12 @@ class Picture:
 
 
 def wavefront(
-    of: Scene, *, seed: int = 1, block: int = BLOCK, shaders=None, handling=None, kind: type[Wavefront] = Wavefront
+    of: Scene, *, seed: int = 1, block: int = BLOCK, shaders=None, handling=None, acceleration=None
 ) -> Wavefront:
     opaque = {Diffuse: "opaque", Mirror: "mirror"}
     shaders = shaders or [opaque.get(type(thing.material), "path") for thing in of.objects]
     traced = TracedScene(of, shaders, handling or ["strict"] * len(of.objects))
-    return kind(traced, CameraRays(of.camera, traced.frame), {}, seed=seed, block=block)
+    return Wavefront(traced, CameraRays(of.camera, traced.frame), {}, seed, block, acceleration)
 
 
 def picture(of: Scene, passes: int, **how) -> Picture:

@@ -1,0 +1,130 @@
+"""Grids, jumps, guides and splits: they change what a picture costs, and never what it shows."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+from renderer.optics.ball_jump import BallJumps, ball_jumps
+from renderer.optics.guided_flight import Guide
+from renderer.shaders import boundary
+from renderer.tracing.acceleration import Acceleration
+from renderer.tracing.distance_grid import DistanceGrid
+from sss_tools.shapes import box, icosphere
+from tests.assertions import assert_mean, seed
+from tests.renderer.scenes import WHITE_SKY, camera, half_white_sky, picture, placed, scene, translucent, wavefront
+
+SIGMA_T = 25.0
+VIEW = camera((0, 0, 5), fov=20, resolution=(40, 40))  # shows nothing but the ball
+PASSES = 120
+
+
+def dense(albedo=(0.99, 0.97, 0.93), sigma_t=SIGMA_T, g=0.0, ior=1.4):
+    ball = placed(icosphere(1, 3), translucent(list(albedo), sigma_t, g, ior))
+    return scene([ball], [half_white_sky()], VIEW)
+
+
+def means(of, number: int, acceleration=None, passes: int = PASSES):
+    """(passes,) means over the picture of the first and last channel, and what was counted."""
+    traced = wavefront(of, seed=seed(number), acceleration=acceleration).trace(0, 0, 1600, passes)
+    radiance = traced.radiance.astype(float).reshape(3, passes, -1).mean(axis=2)
+    return radiance[0], radiance[2], traced.tally
+
+
+def options(of) -> dict[str, Acceleration]:
+    traced = wavefront(of).scene
+    medium = traced.translucent[0].medium
+    grid = DistanceGrid(traced.vertices, traced.triangles, 64)
+    jumps = ball_jumps(medium.sigma_t, medium.single_scattering_albedo)
+    guide = Guide.of(0.985, float(medium.sigma_t[0]))
+    return {
+        "grid": Acceleration(grid, (None,), (None,)),
+        "jumps": Acceleration(grid, (jumps,), (None,)),
+        "guide": Acceleration(None, (None,), (guide,)),
+        "all": Acceleration(grid, (jumps,), (guide,)),
+    }
+
+
+@pytest.fixture(scope="module")
+def plain():
+    return means(dense(), 1)
+
+
+def test_a_grid_changes_no_bit_and_saves_rays():
+    of = dense()
+    with_grid = picture(of, 2, seed=5, acceleration=options(of)["grid"])
+    without = picture(of, 2, seed=5)
+    assert_array_equal(with_grid.samples, without.samples)
+    assert with_grid.tally.rays < 0.6 * without.tally.rays
+    assert with_grid.tally.collisions == without.tally.collisions
+
+
+@pytest.mark.parametrize("name", ["jumps", "guide", "all"])
+def test_options_leave_the_mean_alone(plain, name):
+    """Sees 3 % in the channel that scatters most and in the one that scatters least."""
+    of = dense()
+    *channels, tally = means(of, 2, options(of)[name])
+    assert tally.collisions < 0.8 * plain[2].collisions
+    assert tally.leaked == plain[2].leaked == 0
+    for one, other in zip(channels, plain[:2], strict=True):
+        assert_mean(one - other, 0, false_alarm=1e-4, detects=0.03 * other.mean())
+
+
+def test_jumps_that_forget_the_weight_are_caught(plain, monkeypatch):
+    of, jump = dense(), BallJumps.jump
+    monkeypatch.setattr(BallJumps, "jump", lambda *given: np.ones_like(jump(*given)))
+    *channels, _ = means(of, 2, options(of)["jumps"])
+    with pytest.raises(AssertionError, match="wrong mean"):
+        assert_mean(channels[1] - plain[1], 0, false_alarm=1e-4, detects=0.03 * plain[1].mean())
+
+
+def test_a_guide_with_a_wrong_weight_is_caught(plain, monkeypatch):
+    of, weight = dense(), Guide.weight
+    monkeypatch.setattr(Guide, "weight", lambda self, cosine, *rest: weight(self, 0.9 * cosine, *rest))
+    *channels, _ = means(of, 2, options(of)["guide"])
+    with pytest.raises(AssertionError, match="wrong mean"):
+        assert_mean(channels[0] - plain[0], 0, false_alarm=1e-4, detects=0.03 * plain[0].mean())
+
+
+def test_a_white_body_still_vanishes_in_a_white_sky_when_paths_jump():
+    """Every sample: for white media the tables' weights are 1 but for rounding, over a hundred jumps."""
+    of = scene([placed(icosphere(1, 3), translucent([1.0] * 3, SIGMA_T, 0.0, 1.4))], [WHITE_SKY], VIEW)
+    shown = picture(of, 4, seed=3, acceleration=options(of)["jumps"])
+    assert_allclose(shown.samples, 1, rtol=1e-5)
+
+
+def test_splitting_saves_noise_and_leaves_the_mean_alone(monkeypatch):
+    """Against leaving the first boundary to chance, on a dark ball. Sees 4 %."""
+    of = dense((0.6, 0.6, 0.6))
+    split, *_ = means(of, 4)
+    monkeypatch.setattr(boundary, "WHOLE", np.int8(99))
+    chance, *_ = means(of, 5)
+    assert_mean(split - chance, 0, false_alarm=1e-4, detects=0.04 * chance.mean())
+    assert split.var() < 0.7 * chance.var()  # the ratio of two variances of 120 passes is known to 13 %
+
+
+def chosen(of, pixels: int = 250_000) -> Acceleration:
+    return Acceleration.chosen(wavefront(of).scene, pixels)
+
+
+def test_jumps_and_their_grid_are_chosen_for_dense_bright_bodies_only():
+    assert chosen(dense()).grid is not None
+    assert chosen(dense()).jumps[0] is not None
+    for other in (dense((0.9, 0.9, 0.9)), dense(sigma_t=3.0), dense(g=0.5), dense(sigma_t=[25.0, 26.0, 27.0])):
+        assert chosen(other).grid is None
+        assert chosen(other).jumps == (None,)
+    assert chosen(dense(), pixels=16).grid is None, "a tiny picture does not pay for a grid"
+
+
+def test_guides_are_chosen_where_absorption_shapes_the_light():
+    assert chosen(dense((0.8, 0.8, 0.8))).guides[0].share == 0.75
+    assert chosen(dense((0.8, 0.8, 0.8), sigma_t=3.0)).guides[0].share == 0.5
+    assert chosen(dense((0.999, 0.999, 0.999))).guides == (None,)
+    assert chosen(dense((0.8, 0.8, 0.8), g=0.3)).guides == (None,)
+
+
+def test_what_is_chosen_does_not_depend_on_the_number_of_passes():
+    """There is no way to ask for it: parts of a render must agree bit for bit."""
+    of = scene([placed(box((1, 1, 1)), translucent([0.9] * 3, 5.0, 0.0, 1.3))], [WHITE_SKY], VIEW)
+    assert chosen(of) == chosen(of)
