@@ -7,31 +7,21 @@ beside a solid takes nothing from it.
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass, fields
-from functools import cached_property
-from itertools import pairwise
 from typing import Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .interior import Interior, Shell, find_interior, winding_in_shells
+from .interior import Interior, find_interior
 from .intersection import self_intersections
 from .mesh import Mesh
-from .patches import orient_consistently, patch_of_face
+from .parts import Parts
+from .patches import patch_of_face
+from .roles import Role, find_roles
 from .topology import Topology
-from .winding import deepest_points, spread_by_area, winding_numbers
 
 State = Literal["closed", "holes", "open"]
 Handling = Literal["strict", "cap", "terminate", "surface"]
-Role = Literal["solid", "cavity", "internal", "sheet"]
-
-ENCLOSES = 0.75
-"""Least winding number, somewhere well inside, of a surface with holes that still encloses a volume."""
-
-FLAT = 1e-3
-"""A closed component whose volume is below this share of area times diagonal is looked at for what it encloses:
-two sheets back to back are closed, too."""
-
 
 FOLD = 0.02
 """Share of a component's area that may lie in folds where it passes through itself and still is no internal
@@ -143,6 +133,15 @@ class Assessment:
             return None
         return float(sum(component.volume or 0.0 for component in self.components))
 
+    @property
+    def matter(self) -> float | None:
+        """Volume of the matter in a closed mesh, cubic mesh units, whichever way its shells are oriented; None where
+        the mesh is not closed. What overlaps counts twice."""
+        if self.closedness.state != "closed":
+            return None
+        signs = {"solid": 1, "cavity": -1, "internal": 0, "sheet": 0}
+        return float(sum(signs[part.role] * abs(part.volume or 0.0) for part in self.components))
+
     def faces_of(self, components) -> NDArray[np.int64]:
         """Faces of the components with these numbers, in file order."""
         return np.flatnonzero(np.isin(self.component_of_face, components))
@@ -159,8 +158,8 @@ def assess(mesh: Mesh) -> Assessment:
         raise ValueError("closedness needs finite coordinates")
     topology = mesh.topology
     intersecting = self_intersections(topology)
-    parts = _Parts(topology)
-    roles, inverted = _roles(parts)
+    parts = Parts(topology)
+    roles, inverted = find_roles(parts, intersecting)
     components = tuple(
         Component(len(faces), role, bool(closed), float(volume) if closed else None)
         for faces, role, closed, volume in zip(parts.groups, roles, parts.closed, parts.volumes, strict=True)
@@ -204,92 +203,7 @@ def _handling(state: State, flawless: bool, simple_loops: bool) -> Handling:
     return "strict" if flawless else "terminate"
 
 
-class _Parts:
-    """The components with their measures, one array entry each."""
-
-    def __init__(self, topology: Topology):
-        self.topology = topology
-        self.points = topology.points
-        self.faces, _ = orient_consistently(topology)
-        component = topology.component_of_face
-        self.count = topology.component_count
-        order = np.argsort(component, kind="stable")
-        order = order[np.searchsorted(component[order], 0) :]
-        starts = np.searchsorted(component[order], np.arange(self.count + 1))
-        self.groups = [order[a:b] for a, b in pairwise(starts)]
-
-        sides = topology.face_edges[topology.live]
-        self.component_of_edge = np.zeros(len(topology.edges), np.int64)
-        self.component_of_edge[sides] = component[topology.live][:, None]
-        open_sides = np.bincount(self.component_of_edge[topology.boundary_edges], minlength=self.count)
-        self.closed = open_sides == 0
-
-        self.lower, self.upper = np.empty((self.count, 3)), np.empty((self.count, 3))
-        self.volumes, self.areas = np.empty(self.count), np.empty(self.count)
-        for number, group in enumerate(self.groups):
-            corners = self.points[self.faces[group]]
-            box = corners.reshape(-1, 3)
-            self.lower[number], self.upper[number] = box.min(axis=0), box.max(axis=0)
-            vectors = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-            # about the middle: far from the origin the tetrahedra would cancel to nothing
-            first = corners[:, 0] - (self.lower[number] + self.upper[number]) / 2
-            self.volumes[number] = np.einsum("ij,ij->", first, vectors) / 6
-            self.areas[number] = np.linalg.norm(vectors, axis=1).sum() / 2
-        self.sign = np.sign(self.volumes)
-        self.encloses = np.array([self._encloses(number) for number in range(self.count)], bool)
-
-    def _encloses(self, number: int) -> bool:
-        """Whether a component bounds a volume; settles its sign where the volume does not."""
-        scale = self.areas[number] * np.linalg.norm(self.upper[number] - self.lower[number])
-        if self.closed[number] and abs(self.volumes[number]) > FLAT * scale:
-            return True
-        # two triangles enclose nothing; neither does what has no extent
-        if len(self.groups[number]) < 3 or scale <= 0:
-            return False
-        faces = self.faces[self.groups[number]]
-        winding = winding_numbers(deepest_points(self.points, faces), self.points, faces)
-        deepest = winding[np.argmax(np.abs(winding))] if len(winding) else 0.0
-        if abs(deepest) < ENCLOSES:
-            return False
-        self.sign[number] = np.sign(deepest)
-        return True
-
-    @cached_property
-    def shells(self) -> list[Shell]:
-        """The components that enclose volume."""
-        return [
-            Shell(self.faces[self.groups[number]], self.lower[number], self.upper[number])
-            for number in np.flatnonzero(self.encloses)
-        ]
-
-
-def _roles(parts: _Parts) -> tuple[list[Role], NDArray[np.bool_]]:
-    """The role of each component, and which are solids turned inside out.
-
-    What counts is how the *other* enclosing components wind round a component: with its own orientation it
-    bounds a void (opposite signs) or lies in matter (equal signs).
-    """
-    roles: list[Role] = ["sheet"] * parts.count
-    inverted = np.zeros(parts.count, bool)
-    numbers = np.flatnonzero(parts.encloses)
-    for number in numbers:
-        apart = (parts.lower[numbers] > parts.upper[number]) | (parts.upper[numbers] < parts.lower[number])
-        around = ~apart.any(axis=1) & (numbers != number)
-        others = [parts.shells[index] for index in np.flatnonzero(around)]
-        group = parts.groups[number]
-        # a few centroids, and their majority: others may touch this component or cut through it
-        chosen = group[spread_by_area(np.ones(len(group)), 5)]
-        samples = parts.points[parts.faces[chosen]].mean(axis=1)
-        outside = float(np.median(winding_in_shells(samples, parts.points, others))) if others else 0.0
-        if abs(outside) < 0.5:
-            roles[number] = "solid"
-            inverted[number] = parts.sign[number] < 0
-        else:
-            roles[number] = "cavity" if outside * parts.sign[number] < 0 else "internal"
-    return roles, inverted
-
-
-def _interior(parts: _Parts, intersecting: NDArray[np.int64]) -> Interior:
+def _interior(parts: Parts, intersecting: NDArray[np.int64]) -> Interior:
     """What lies inside solids; nothing can where a single manifold component that meets itself nowhere is all.
 
     intersecting  (p, 2) pairs of faces that meet others
@@ -310,7 +224,7 @@ def _interior(parts: _Parts, intersecting: NDArray[np.int64]) -> Interior:
     )
 
 
-def _share(parts: _Parts, found: Interior, number: int) -> float:
+def _share(parts: Parts, found: Interior, number: int) -> float:
     """How much of a component's area, at most, lies inside."""
     faces = np.concatenate([*found.patches, found.faces])
     faces = faces[parts.topology.component_of_face[faces] == number]

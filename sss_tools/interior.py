@@ -15,8 +15,9 @@ SOLID = 0.5
 SAMPLES = 3
 """Faces asked in each patch; most of them decide."""
 
-CUT_FACES = 200
-"""Faces asked, the largest, of those that meet others."""
+CUT_FACES, CUT_PAIRS = 200, 6_000_000
+"""Of the faces that meet others the largest are asked: so many in any case, more while they cost fewer point-face
+pairs than this. Which of two equally large ones comes last is chance: hence all of them in small meshes."""
 
 _PLACES = np.array([[1, 1, 1], [18, 1, 1], [1, 18, 1], [1, 1, 18], [5, 5, 1], [1, 5, 5], [5, 1, 5]], float)
 _PLACES /= _PLACES.sum(axis=1, keepdims=True)
@@ -95,7 +96,8 @@ def find_interior(points, faces, patch_of_face, shells: list[Shell], component_o
     cut = cut[(areas[cut] > 0) & (component_of_face[cut] >= 0)]
     cut = cut[np.argsort(-areas[cut], kind="stable")]
     places = np.einsum("pk,fki->fpi", _PLACES, corners[cut])
-    reached = min(budget.spend(places[:, 0], 2 * len(_PLACES)), CUT_FACES)
+    most = max(CUT_FACES, CUT_PAIRS // (2 * len(_PLACES) * sum(len(shell.faces) for shell in shells)))
+    reached = budget.spend(places[:most, 0], 2 * len(_PLACES))
     cut, places = cut[:reached], places[:reached]
     asked = np.repeat(cut, len(_PLACES))
     inside = _solid_on_both_sides(points, corners[asked], vectors[asked], shells, places.reshape(-1, 3))

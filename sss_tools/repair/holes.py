@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ..closedness import ENCLOSES
+from ..enclosure import ENCLOSES
 from .draft import Declined, Draft
 from .fairing import fair, refine
 from .judge import count_crossing_faces

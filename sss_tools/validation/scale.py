@@ -104,7 +104,7 @@ def _unit(subject: Subject) -> str:
 
 def _scale_verdict(subject: Subject, medium: Medium) -> str | None:
     """What is wrong with the size of the mesh in this medium, coefficients per mesh unit; None if nothing is."""
-    mesh, volume = subject.mesh, subject.assessment.volume
+    mesh, volume = subject.mesh, subject.assessment.matter
     unit = _unit(subject)
     path = medium.transport_mean_free_path
     # the mean chord of a body, 4 V / S (Cauchy); of an unclosed one, what its box would have

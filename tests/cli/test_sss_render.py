@@ -231,9 +231,9 @@ def test_ctrl_c_leaves_a_picture_of_whole_passes_and_status_130(workplace, start
         (shapes.icosphere(1.0, 2), "closed", "strict", "closed, manifold and oriented"),
         (shapes.punctured(shapes.icosphere(1.0, 3), [[0, 1, 0]], 0.2), "holes", "terminate", "1 hole(s): paths that"),
         (shapes.with_internal(shapes.icosphere(1.0, 2), (0, 0, 0), 0.4, 1), "closed", "terminate", "with flaws"),
-        (shapes.punctured(shapes.icosphere(1.0, 3), [[0, 1, 0]], 1.6), "open", "surface", "encloses no volume"),
+        (shapes.punctured(shapes.icosphere(1.0, 3), [[0, 1, 0]], 1.85), "open", "surface", "encloses no volume"),
     ],
-    ids=["closed", "a hole", "a shell inside", "a bowl"],
+    ids=["closed", "a hole", "a shell inside", "a saucer"],
 )
 def test_closedness_decides_what_is_done_at_holes_and_the_command_says_why(
     workplace, capsys, mesh, state, handling, because
@@ -247,7 +247,7 @@ def test_closedness_decides_what_is_done_at_holes_and_the_command_says_why(
 
 
 def test_a_shader_forced_on_what_has_no_inside_becomes_the_diffuse_fallback_with_a_warning(workplace, capsys):
-    write_mesh(shapes.punctured(shapes.icosphere(1.0, 3), [[0, 1, 0]], 1.6), "ball.ply")
+    write_mesh(shapes.punctured(shapes.icosphere(1.0, 3), [[0, 1, 0]], 1.85), "ball.ply")
     report = reported("--passes", 1)
     assert report["objects"][0]["shader"] == "diffuse"
     error = capsys.readouterr().err

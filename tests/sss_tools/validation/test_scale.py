@@ -97,3 +97,11 @@ def test_coarse_tessellation_is_a_round_body_of_facets_longer_than_light_is_scat
     # facets turn by 360/20 = 18 degrees: smooth enough; by 90 degrees: meant
     assert result_of("SSS404", shapes.cylinder(1.0, 2.0, 20), medium(0.1)).outcome == Outcome.PASS
     assert result_of("SSS404", shapes.box(), medium(0.1)).outcome == Outcome.PASS
+
+
+def test_the_scale_of_two_solids_is_judged_alike_when_one_is_inside_out():
+    """Their signed volumes cancel: nothing is left of the mean chord, but all of the matter is there."""
+    ball = shapes.icosphere(1.0, 2)
+    both = shapes.joined(shapes.inverted(ball), shapes.moved(ball, [3, 0, 0]))
+    assert result_of("SSS502", both, medium(0.1)).outcome == Outcome.PASS
+    assert result_of("SSS502", both, medium(2.0)).outcome == Outcome.FAIL
