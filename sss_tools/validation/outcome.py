@@ -32,7 +32,7 @@ class Outcome(StrEnum):
     NOT_RUN = "not-run"
 
 
-RULES_VERSION = "1"
+RULES_VERSION = "2"
 """Changes when a verdict may change; a record of another version is not trusted."""
 
 UNUSABLE = ("SSS602", "SSS701", "SSS702")
