@@ -84,8 +84,8 @@ def find_coarse_tessellation(subject: Subject) -> Finding | None:
     cosine = np.einsum("ij,ij->i", normals[left], normals[right])
     corners = mesh.vertices[mesh.faces]
     longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
+    # a face without area has no normal: its cosines are 0
     bent = (cosine < np.cos(COARSE)) & (cosine > np.cos(FEATURE))
-    bent &= (mesh.face_areas[left] > 0) & (mesh.face_areas[right] > 0)
     long = longest > min(limits.values())
     bent &= long[left] | long[right]
     faces = np.unique(np.concatenate([left[bent], right[bent]]))

@@ -97,6 +97,9 @@ def test_coarse_tessellation_is_a_round_body_of_facets_longer_than_light_is_scat
     # facets turn by 360/20 = 18 degrees: smooth enough; by 90 degrees: meant
     assert result_of("SSS404", shapes.cylinder(1.0, 2.0, 20), medium(0.1)).outcome == Outcome.PASS
     assert result_of("SSS404", shapes.box(), medium(0.1)).outcome == Outcome.PASS
+    # 360/9 = 40 degrees are meant to be round, 360/7 = 51 to be edges
+    assert result_of("SSS404", shapes.cylinder(1.0, 2.0, 9), medium(0.1)).outcome == Outcome.FAIL
+    assert result_of("SSS404", shapes.cylinder(1.0, 2.0, 7), medium(0.1)).outcome == Outcome.PASS
 
 
 def in_view(pixel, medium=None, unit="cm"):
@@ -138,8 +141,8 @@ def test_coarse_tessellation_names_what_facets_exceed():
 
 
 def test_the_worst_turn_is_that_of_the_facets_reported():
-    """A fine sphere of sharper turns beside a coarse cylinder is not what the message is about."""
-    tiny = shapes.moved(shapes.icosphere(0.01, 1), [5, 0, 0])
+    """A tiny cylinder of sharper turns beside a large one is not what the message is about."""
+    tiny = shapes.moved(shapes.cylinder(0.01, 0.02, 9), [5, 0, 0])
     mixed = coarseness(shapes.joined(shapes.cylinder(1.0, 2.0, 12), tiny), Context(medium(0.1), "cm"))
     assert mixed.count == 24 and "20 to 30 degrees" in mixed.message
 
