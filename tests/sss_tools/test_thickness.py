@@ -130,3 +130,9 @@ def test_rays_of_limited_length_see_the_same_walls_and_nothing_beyond():
     within = far < 0.15
     assert within.any() and (near[within] == far[within]).all() and np.isinf(near[~within]).all()
     assert np.isinf(wall_thickness(hollow, 0.05)).all()
+
+
+def test_a_ball_stays_held_by_what_held_it_when_finer_points_find_nothing_nearer():
+    hollow = shapes.hollow_ball(1.0, 0.9, 4)
+    diameter, wall = balls_at(hollow, np.arange(len(hollow.faces)), 2.0)
+    assert diameter.max() < 0.12 and wall.mean() > 0.99
