@@ -117,11 +117,13 @@ class TaskMaker:
 
 
 def _codes(texts: Sequence[str], option: str) -> tuple[str, ...]:
-    """Codes and beginnings of codes from comma-separated lists; each must mean at least one rule."""
+    """Codes, beginnings of codes and names from comma-separated lists; each must mean at least one rule."""
     try:
         codes = codes_of(",".join(texts))
     except ValueError as error:
-        raise InputError(f"{option} {error}", "no rule has such a code", "use for example SSS1 or SSS101") from None
+        raise InputError(
+            f"{option} {error}", "no rule has such a code or name", "use for example SSS1 or SSS101"
+        ) from None
     if texts and not codes:
         raise InputError(option, "no code given", "use for example SSS1 or SSS101,SSS203")
     return codes

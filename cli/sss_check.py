@@ -86,7 +86,7 @@ def _parser() -> ArgumentParser:
     add("--format", choices=FORMATS, default="full", help="how to report (default: full)")
     add("-o", "--output", metavar="FILE", help="write the report there instead of to stdout")
     add("--unit", choices=("mm", "cm", "m", "inch"), help="what one mesh unit is")
-    add("--select", metavar="CODES", action="append", default=[], help="run these rules: codes or prefixes, a,b,c")
+    add("--select", metavar="CODES", action="append", default=[], help="rules to run: codes, prefixes, names: a,b")
     add("--ignore", metavar="CODES", action="append", default=[], help="leave these out (SSS602, SSS70x always run)")
     add("--severity", metavar="CODE=LEVEL", action="append", default=[], help="error, warning or info instead")
     fix = parser.add_mutually_exclusive_group()

@@ -3,8 +3,9 @@
 The names below are the stable interface; they are imported when first used, so that commands start quickly.
 """
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from sss_tools.lazy import names_from
 
 if TYPE_CHECKING:
     from .job import Budget, execute
@@ -39,8 +40,4 @@ __all__ = [
     "stage_mesh",
 ]
 
-
-def __getattr__(name: str) -> Any:
-    if name not in _HOMES:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(import_module(f".{_HOMES[name]}", __name__), name)
+__getattr__ = names_from(__name__, _HOMES)

@@ -4,7 +4,7 @@ For each mesh the nearest file counts: in its folder, else in the folders above 
 nearest to the working directory. Files are not merged, and in one folder ``sss.toml`` comes first. A
 ``pyproject.toml`` without the table is passed over. Paths and patterns in a file are relative to its folder.
 
-    select = ["SSS1", "SSS204"]             # codes, or beginnings of codes
+    select = ["SSS1", "SSS204"]             # codes, beginnings of codes, or names
     ignore = ["SSS402"]
     severity = { SSS202 = "error" }
     per-path-ignores = { "scans/*" = ["SSS101"] }
@@ -146,12 +146,14 @@ def read_configuration(table: Any, path: Path) -> Configuration:
 
 
 def codes_of(text: str) -> tuple[str, ...]:
-    """Codes and beginnings of codes from a comma-separated list. Raises ValueError for what no rule has."""
-    codes = tuple(part.strip().upper() for part in text.split(",") if part.strip())
-    for code in codes:
-        if not any(rule.code.startswith(code) for rule in all_rules()):
-            raise ValueError(code)
-    return codes
+    """Codes, beginnings of codes and names, from a comma-separated list. Raises ValueError for what no rule has."""
+    return tuple(_beginning_of(part.strip()) for part in text.split(",") if part.strip())
+
+
+def _beginning_of(text: str) -> str:
+    if any(rule.code.startswith(text.upper()) for rule in all_rules()):
+        return text.upper()
+    return code_of(text)
 
 
 def code_of(text: str) -> str:
@@ -201,7 +203,7 @@ def _to_count(value: Any) -> int:
     return value
 
 
-_CODES = Kind('a list of codes or beginnings of codes, for example ["SSS1", "SSS204"]', _to_codes)
+_CODES = Kind('a list of codes, beginnings of codes or names, for example ["SSS1", "SSS204"]', _to_codes)
 _KEYS = {
     "select": Key(_CODES, ()),
     "ignore": Key(_CODES, ()),

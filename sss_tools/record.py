@@ -35,7 +35,7 @@ class Record:
     components  as in the report of a check
     findings    rule objects as in the report of a check, waived ones included
     waivers     code -> the reason the user gave for accepting what the rule finds in this geometry
-    repairs     what was done to the mesh to make it what it is
+    repairs     what was done to the mesh to make it what it is: the rungs applied, first to last
     """
 
     hash: str
@@ -133,15 +133,24 @@ def read_record(mesh_path: str | Path, mesh: Mesh) -> Record | None:
         return Record(
             hash=data["hash"],
             closedness=Closedness.from_json(data["closedness"]),
-            material=data["material"],
-            components=list(data["components"]),
-            findings=list(data["findings"]),
+            material=_material(data),
+            components=_objects(data, "components", "faces", "role"),
+            findings=_objects(data, "findings", "code", "outcome"),
             waivers=_waivers(data),
-            repairs=list(data["repairs"]),
+            repairs=_objects(data, "repairs", "name", "status"),
         )
     except (KeyError, TypeError, ValueError) as error:
         _ignore(path, f"is incomplete ({type(error).__name__}: {error})")
         return None
+
+
+def read_repairs(mesh_path: str | Path, digest: str) -> list[dict[str, Any]]:
+    """What was done to make geometry with this hash what it is, as its record says; [] where none can be trusted."""
+    try:
+        data = _parse(record_path(mesh_path))
+        return [] if data is None or data.get("hash") != digest else _objects(data, "repairs", "name", "status")
+    except (KeyError, TypeError, ValueError):
+        return []
 
 
 def read_waivers(mesh_path: str | Path, digest: str) -> tuple[dict[str, str], list[str]]:
@@ -177,8 +186,25 @@ def _parse(path: Path) -> dict[str, Any] | None:
     return data
 
 
+def _objects(data: dict[str, Any], key: str, *needed: str) -> list[dict[str, Any]]:
+    """The list of objects under ``key``, each with the keys ``needed``. Raises KeyError or TypeError for another."""
+    objects = data[key]
+    if not isinstance(objects, list) or not all(isinstance(entry, dict) for entry in objects):
+        raise TypeError(f'"{key}" is no list of objects')
+    for entry in objects:
+        for name in needed:
+            entry[name]
+    return objects
+
+
+def _material(data: dict[str, Any]) -> str | None:
+    if not isinstance(data["material"], str | None):
+        raise TypeError('"material" is no name')
+    return data["material"]
+
+
 def _waivers(data: dict[str, Any]) -> dict[str, str]:
-    return {str(waiver["code"]): str(waiver["reason"]) for waiver in data["waivers"]}
+    return {str(waiver["code"]): str(waiver["reason"]) for waiver in _objects(data, "waivers", "code", "reason")}
 
 
 def _ignore(path: Path, problem: str) -> None:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ..mesh import Mesh
 from ..rays import RAY_OFFSET, RayCaster, UnitFrame
+from ..topology import Topology
 from .draft import Draft
 
 FARTHEST = 0.01
@@ -34,7 +35,8 @@ class Condition:
     duplicates  faces over the same three points as another
     crossings   faces that pass through or overlap each other; None where that could not be found out
     solids, cavities, internal, sheets  components of each role
-    volume      by the divergence theorem, None where open edges leave it undefined
+    volume      by the divergence theorem, None where that is undefined: where faces do not run through each edge as
+                often one way as the other, as at open edges and round a face that is there twice
     """
 
     faces: int
@@ -92,7 +94,7 @@ class Examined:
         return Condition(
             faces=len(self.mesh.faces),
             area=self.mesh.area,
-            volume=None if len(topology.boundary_edges) else self.mesh.volume,
+            volume=self.mesh.volume if _is_cycle(topology) else None,
             open_edges=len(topology.boundary_edges),
             non_manifold_edges=len(topology.nonmanifold_edges),
             pinches=len(topology.pinched_points),
@@ -106,6 +108,12 @@ class Examined:
             internal=roles.count("internal") + len(self.draft.assessment.interior.patches),
             sheets=roles.count("sheet"),
         )
+
+
+def _is_cycle(topology: Topology) -> bool:
+    """Whether faces run through every edge as often one way as the other."""
+    edges, forward = topology.face_edges[topology.live].ravel(), topology.side_direction[topology.live].ravel()
+    return not np.bincount(edges, np.where(forward, 1, -1), len(topology.edges)).any()
 
 
 def count_crossing_faces(mesh: Mesh) -> int | None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from ..closedness import ENCLOSES
 from ..seams import SEAM_TOLERANCE, edges_closed_by_welding
 from .outcome import FixSafety, Severity
 from .rule import Finding, Rule, Subject, plural
@@ -44,7 +45,8 @@ def find_sheets(subject: Subject) -> Finding | None:
     return Finding(
         count=len(sheets),
         message=f"{len(sheets)} of {plural(total, 'component')} "
-        f"{'encloses' if len(sheets) == 1 else 'enclose'} nothing ({plural(len(faces), 'face')})",
+        f"{'encloses' if len(sheets) == 1 else 'enclose'} nothing (winding number below {ENCLOSES:g} everywhere; "
+        f"{plural(len(faces), 'face')})",
         faces=faces,
     )
 

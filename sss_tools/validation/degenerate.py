@@ -89,7 +89,7 @@ NEEDLE_FACE = Rule(
     finds="aspect ratio that ruins normals or intersection",
     why="Rounding tilts its normal, so highlights sparkle on it, and rays slip through along its long sides.",
     fix="remesh, or flip the edge to a better neighbour",
-    fix_safety=FixSafety.UNSAFE,
+    fix_safety=FixSafety.NONE,
     check=find_needles,
 )
 
@@ -99,7 +99,7 @@ UNREFERENCED_VERTEX = Rule(
     severity=Severity.INFO,
     finds="vertices no face uses",
     why="Nothing happens to the light; but tools that frame or scale by all vertices get the size wrong.",
-    fix="remove them",
-    fix_safety=FixSafety.SAFE,
+    fix="remove them; a copy that is written because of something else is without them",
+    fix_safety=FixSafety.NONE,
     check=find_unreferenced_vertices,
 )

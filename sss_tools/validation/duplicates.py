@@ -23,7 +23,7 @@ def find_duplicates(subject: Subject) -> Finding | None:
     pairs = pairs[np.argsort(pairs[:, 1], kind="stable")]
     return Finding(
         count=len(pairs),
-        message=f"{plural(len(pairs), 'face')} over the same three points as an earlier one",
+        message=f"{plural(len(pairs), 'face')} over the same three points as an earlier one (exact, no tolerance)",
         faces=np.unique(pairs),
         face_pairs=pairs,
     )

@@ -120,7 +120,7 @@ OVERLAPPING_SOLIDS = Rule(
     finds="two closed solids that interpenetrate or touch",
     why="Two media in one place have no right answer: what light does there depends on which object is listed first.",
     fix="move them apart, or cut one from the other",
-    fix_safety=FixSafety.UNSAFE,
+    fix_safety=FixSafety.NONE,
     check=find_overlaps,
 )
 

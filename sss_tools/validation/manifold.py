@@ -16,7 +16,7 @@ def find_shared_edges(subject: Subject) -> Finding | None:
     most = topology.faces_per_edge[edges].max()
     return Finding(
         count=len(edges),
-        message=f"{plural(len(edges), 'edge')} with more than two faces (up to {most})",
+        message=f"{plural(len(edges), 'edge')} with more than two faces (up to {most}; exact, no tolerance)",
         edges=subject.edge_vertices(edges),
         faces=faces_at(topology.face_edges, edges),
     )
@@ -29,7 +29,7 @@ def find_pinches(subject: Subject) -> Finding | None:
         return None
     return Finding(
         count=len(points),
-        message=f"{plural(len(points), 'vertex', 'vertices')} where faces meet in a point alone",
+        message=f"{plural(len(points), 'vertex', 'vertices')} where faces meet in a point alone (exact, no tolerance)",
         vertices=subject.vertex_of_point[points],
     )
 
@@ -53,7 +53,7 @@ NON_MANIFOLD_VERTEX = Rule(
     finds="faces that meet in a vertex alone",
     why="The light passes none the worse, but the point has no normal and no curvature: a bright or dark speck in "
     "the approximate shaders.",
-    fix="give each fan of faces its own vertex",
-    fix_safety=FixSafety.SAFE,
+    fix="give each fan of faces its own vertex, drawn a hair's breadth apart",
+    fix_safety=FixSafety.UNSAFE,
     check=find_pinches,
 )

@@ -16,7 +16,7 @@ def find_disagreeing_neighbours(subject: Subject) -> Finding | None:
         return None
     return Finding(
         count=len(edges),
-        message=f"{plural(len(edges), 'edge')} across which the faces disagree on outside",
+        message=f"{plural(len(edges), 'edge')} across which the faces disagree on outside (exact, no tolerance)",
         edges=subject.edge_vertices(edges),
         faces=faces_at(subject.topology.face_edges, edges),
     )
@@ -32,7 +32,8 @@ def find_inverted_shells(subject: Subject) -> Finding | None:
     faces = assessment.faces_of(inverted)
     return Finding(
         count=len(inverted),
-        message=f"{plural(len(inverted), 'solid')} with normals pointing inwards ({plural(len(faces), 'face')})",
+        message=f"{plural(len(inverted), 'solid')} with normals pointing inwards ({plural(len(faces), 'face')}; "
+        "by the sign of the volume, no tolerance)",
         faces=faces,
     )
 

@@ -13,7 +13,7 @@ from ..errors import InputError
 from ..loading import load_mesh
 from ..medium import Medium
 from ..mesh import Mesh
-from ..record import geometry_hash, write_record
+from ..record import geometry_hash, read_repairs, write_record
 from ..waivers import waive
 from .outcome import UNUSABLE, FixSafety, MeshReport, Outcome, RuleReport
 from .rule import Context, Finding, NotRun, Rule, Subject, all_rules
@@ -47,13 +47,13 @@ def check_file(path: str | Path, settings: Settings | None = None) -> MeshReport
         return report
     context, problems = _context(mesh, settings)
     report = _known_or_checked(mesh, context, settings, path)
-    repairs: list[dict[str, Any]] = []
+    repairs = read_repairs(path, report.hash or "") if settings.record else []
     if settings.fix and report.error is None:
         report, result = _repaired(path, mesh, context, report, settings)
         if result is not None and report.repair is not None and report.repair["output"] is not None:
             # waivers and record are those of the result: it is other geometry
             path, mesh, report.hash = report.repair["output"], result, geometry_hash(result)
-            repairs = [rung for rung in report.repair["rungs"] if rung["status"] == "applied"]
+            repairs = [*repairs, *(rung for rung in report.repair["rungs"] if rung["status"] == "applied")]
     report.warnings += problems
     if settings.surroundings is not None:
         report.object = settings.surroundings.placed.name

@@ -32,7 +32,7 @@ def find_thin_walls(subject: Subject) -> Finding | None:
     mean_free_path = float(medium.mean_free_path.min())
     offset = float(RAY_OFFSET) * mesh.longest_side
     limit = max(mean_free_path, offset)
-    thickness = wall_thickness(mesh)
+    thickness = wall_thickness(mesh, limit)
     thin = thickness < limit
     chosen = spread_by_area(mesh.face_areas, BALLS)
     diameter, wall = inscribed_balls(mesh, chosen, np.minimum(thickness[chosen], limit))
@@ -44,11 +44,13 @@ def find_thin_walls(subject: Subject) -> Finding | None:
         return None
     lost = int((thickness < offset).sum())
     unit = _unit(subject)
+    measured = "" if len(chosen) == len(mesh.faces) else f" (measured by ray at every face, by ball at {len(chosen)})"
+    what = "the least mean free path" if mean_free_path >= offset else "the ray offset"
     return Finding(
         count=len(faces),
         message=f"{plural(len(faces), 'face')} ({mesh.face_areas[faces].sum() / mesh.area:.1%} of the area) on walls "
-        f"thinner than {limit:.3g} {unit}, the least mean free path; the thinnest is {thickness.min():.3g} {unit}; "
-        f"{lost} below the ray offset of {offset:.3g} {unit}",
+        f"thinner than {limit:.3g} {unit}, {what}; the thinnest is {thickness.min():.3g} {unit}; "
+        f"{lost} below the ray offset of {offset:.3g} {unit}{measured}",
         faces=faces,
     )
 
@@ -66,27 +68,37 @@ def find_scale_mismatch(subject: Subject) -> Finding | None:
 
 
 def find_coarse_tessellation(subject: Subject) -> Finding | None:
-    """Facets of a round surface that are longer than the light is scattered."""
-    medium, mesh, topology = _medium(subject), subject.mesh, subject.topology
-    reach = float(medium.transport_mean_free_path.min())
+    """Facets of a round surface that are longer than light is scattered, or than a pixel is wide."""
+    medium, pixel = subject.context.medium, subject.context.pixel_footprint
+    unit = _unit(subject)
+    limits = {}
+    if medium is not None:
+        limits["the least transport mean free path"] = float(medium.transport_mean_free_path.min())
+    if pixel is not None:
+        limits["a pixel"] = pixel
+    if not limits:
+        raise NotRun("no scene and no material")
+    mesh, topology = subject.mesh, subject.topology
     left, right = (side // 3 for side in topology.side_pairs)
     normals = mesh.face_normals
     cosine = np.einsum("ij,ij->i", normals[left], normals[right])
     corners = mesh.vertices[mesh.faces]
     longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
+    # a face without area has no normal: its cosines are 0
     bent = (cosine < np.cos(COARSE)) & (cosine > np.cos(FEATURE))
-    bent &= (mesh.face_areas[left] > 0) & (mesh.face_areas[right] > 0)
+    long = longest > min(limits.values())
+    bent &= long[left] | long[right]
     faces = np.unique(np.concatenate([left[bent], right[bent]]))
-    faces = faces[longest[faces] > reach]
+    faces = faces[long[faces]]
     if len(faces) == 0:
         return None
     worst = float(np.degrees(np.arccos(cosine[bent].min())))
-    unit = _unit(subject)
+    exceeded = [f"{what} of {limit:.3g} {unit}" for what, limit in limits.items() if longest[faces].max() > limit]
     return Finding(
         count=len(faces),
         message=f"{plural(len(faces), 'facet')} turn by {np.degrees(COARSE):.0f} to {worst:.0f} degrees to a neighbour "
         f"(more than {np.degrees(FEATURE):.0f} would be an edge) and are up to {longest[faces].max():.3g} {unit} long, "
-        f"more than the least transport mean free path of {reach:.3g} {unit}",
+        f"more than {' and '.join(exceeded)}",
         faces=faces,
     )
 
@@ -99,6 +111,8 @@ def _medium(subject: Subject) -> Medium:
 
 def _unit(subject: Subject) -> str:
     """What a mesh unit is called; presets take it for a millimetre where nobody said."""
+    if subject.context.unit is None and subject.context.neighbours is not None:
+        return "mesh units"  # of an object that its scene scales: they have no name
     return subject.context.unit or "mm (assumed)"
 
 
@@ -132,9 +146,10 @@ COARSE_TESSELLATION = Rule(
     name="coarse-tessellation",
     severity=Severity.INFO,
     finds="facets large against the curvature, the scattering length or the pixel",
-    why="Light scatters between the facets' edges as in the faceted solid it is: corners glow, planes do not.",
+    why="Light scatters between the facets' edges as in the faceted solid it is: corners glow, planes do not. Facets "
+    "wider than a pixel show in the outline and in what the surface reflects, too.",
     fix="subdivide",
-    fix_safety=FixSafety.UNSAFE,
+    fix_safety=FixSafety.NONE,
     check=find_coarse_tessellation,
 )
 

@@ -69,6 +69,25 @@ def test_unsafe_fixes_close_it_and_a_second_run_changes_nothing(folder, capsys):
     assert files(folder) == ["bowl.fixed.ply", "bowl.ply"]
 
 
+def test_the_record_of_a_result_keeps_how_it_came_to_be(folder, capsys):
+    write_mesh(shapes.inverted(shapes.box()), "box.ply")
+
+    def recorded():
+        return [rung["name"] for rung in json.loads((folder / "box.fixed.ply.sss.json").read_text())["repairs"]]
+
+    run_json(capsys, "box.ply", "--fix", "--record")
+    assert recorded() == ["orientation"]
+    # checked again, and fixed again: it is the same geometry
+    run_json(capsys, "box.fixed.ply", "--record")
+    assert recorded() == ["orientation"]
+    run_json(capsys, "box.fixed.ply", "--unsafe-fixes", "--record")
+    assert recorded() == ["orientation"]
+    # another mesh of that name has another past
+    write_mesh(shapes.box(2.0), "box.fixed.ply")
+    run_json(capsys, "box.fixed.ply", "--record")
+    assert recorded() == []
+
+
 def test_clean_and_refused_meshes_write_nothing(folder, capsys):
     write_mesh(shapes.box(), "clean.ply")
     write_mesh(Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]]), "sheet.ply")

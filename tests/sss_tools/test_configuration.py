@@ -1,6 +1,6 @@
 import pytest
 
-from sss_tools.configuration import Configurations, size_of
+from sss_tools.configuration import Configurations, codes_of, size_of
 from sss_tools.errors import InputError
 from sss_tools.validation.outcome import Severity
 
@@ -67,6 +67,13 @@ def test_codes_are_ignored_by_path(project):
     assert found.ignored_for(project / "scans" / "old" / "a.ply") == ("SSS101",)
     assert found.ignored_for(project / "scans" / "x.ply") == ("SSS101", "SSS2")
     assert found.ignored_for(project / "rescans" / "a.ply") == ()
+
+
+def test_rules_go_by_code_by_the_beginning_of_a_code_and_by_name():
+    assert codes_of("sss1, Self-Intersection,SSS204") == ("SSS1", "SSS302", "SSS204")
+    for text in ("SSS9", "self", "SSS3021"):
+        with pytest.raises(ValueError, match=text):
+            codes_of(text)
 
 
 def test_a_material_file_is_named_relative_to_the_configuration(project):

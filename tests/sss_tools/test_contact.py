@@ -50,3 +50,21 @@ def test_the_gap_of_two_triangles_is_the_least_distance_of_their_points(seed):
 def test_what_passes_through_has_no_gap():
     faces, gap = near_faces(shapes.box(), beside(-0.5), 1e-3)
     assert gap == 0 and len(faces)
+
+
+def test_boxes_that_share_one_corner_touch_there():
+    touching = common_faces(shapes.box(), shapes.moved(shapes.box(), [1, 1, 1]))
+    corner = shapes.box().bounds[1]
+    at_corner = (shapes.box().vertices[shapes.box().faces] == corner).all(axis=2).any(axis=1)
+    assert touching.tolist() == np.flatnonzero(at_corner).tolist()
+
+
+def test_a_ball_lies_within_a_box_that_is_turned_inside_out():
+    box = shapes.box(4.0)
+    assert lies_within(shapes.moved(shapes.icosphere(0.5), box.bounds.mean(axis=0)), shapes.inverted(box))
+
+
+def test_a_tip_that_pokes_through_the_middle_of_a_face_leaves_no_gap():
+    face = Mesh(np.array([[-4.0, -4, 0], [4, -4, 0], [0, 4, 0]]), [[0, 1, 2]])
+    tip = Mesh(np.array([[-0.1, 0, 1], [0.1, 0, 1], [0, 0, -5e-4]]), [[0, 1, 2]])
+    assert near_faces(face, tip, 1e-3) == (pytest.approx([0]), 0.0)

@@ -8,7 +8,15 @@ from sss_tools import shapes
 from sss_tools.closedness import assess
 from sss_tools.medium import Medium
 from sss_tools.mesh import Mesh
-from sss_tools.record import RecordWarning, geometry_hash, read_record, read_waivers, record_path, write_record
+from sss_tools.record import (
+    RecordWarning,
+    geometry_hash,
+    read_record,
+    read_repairs,
+    read_waivers,
+    record_path,
+    write_record,
+)
 from sss_tools.validation.run import check_mesh
 
 
@@ -59,6 +67,16 @@ def test_waivers_outlive_the_rules_but_not_the_geometry(recorded):
     assert read_waivers(path, geometry_hash(mesh)) == ({}, [])
 
 
+def test_repairs_belong_to_the_geometry_they_made(recorded):
+    path, mesh = recorded
+    assert read_repairs(path, geometry_hash(mesh)) == [{"name": "weld", "status": "applied"}]
+    assert read_repairs(path, "blake2b:other") == []
+    record_path(path).write_text("{")
+    assert read_repairs(path, geometry_hash(mesh)) == []
+    record_path(path).unlink()
+    assert read_repairs(path, geometry_hash(mesh)) == []
+
+
 def test_no_record_is_no_warning(tmp_path):
     with warnings.catch_warnings():
         warnings.simplefilter("error")
@@ -84,6 +102,14 @@ def test_a_record_of_other_geometry_is_ignored_with_a_warning(recorded):
         (lambda data: {**data, "closedness": {}}, "incomplete"),
         (lambda data: {key: data[key] for key in data if key != "findings"}, "incomplete"),
         (lambda data: {key: data[key] for key in data if key != "waivers"}, "incomplete"),
+        (lambda data: {key: data[key] for key in data if key != "repairs"}, "incomplete"),
+        (lambda data: {**data, "repairs": "weld"}, "no list of objects"),
+        (lambda data: {**data, "repairs": ["weld"]}, "no list of objects"),
+        (lambda data: {**data, "repairs": [{"name": "weld"}]}, "incomplete.*status"),
+        (lambda data: {**data, "findings": [{}]}, "incomplete.*code"),
+        (lambda data: {**data, "components": {}}, "no list of objects"),
+        (lambda data: {**data, "waivers": {}}, "no list of objects"),
+        (lambda data: {**data, "material": 3}, "no name"),
         (lambda data: [data], "schema"),
     ],
 )

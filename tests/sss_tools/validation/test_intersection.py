@@ -87,3 +87,30 @@ def test_near_contact_is_a_gap_below_twice_the_ray_offset():
     assert result_of("SSS503", shapes.box(), in_scene(beside(1.1 * least), extent=4.0)).outcome == Outcome.FAIL
     # what touches is an overlap
     assert result_of("SSS503", shapes.box(), in_scene(beside(0.0))).outcome == Outcome.PASS
+
+
+@pytest.mark.parametrize("axis", range(3))
+@pytest.mark.parametrize("side", [-1, 1])
+def test_neighbours_on_any_side_count(axis, side):
+    def at(gap):
+        offset = np.full(3, 0.25)
+        offset[axis] = side * (1 + gap)
+        return Neighbour("other", shapes.moved(shapes.box(), offset))
+
+    assert result_of("SSS304", shapes.box(), in_scene(at(0.0))).outcome == Outcome.FAIL
+    assert result_of("SSS503", shapes.box(), in_scene(at(2e-6))).outcome == Outcome.FAIL
+
+
+@pytest.mark.parametrize("code", ["SSS304", "SSS503"])
+def test_opaque_neighbours_do_not_count(code):
+    """Light ends at their surface: there is no second medium, and nothing behind that a ray could miss."""
+    gap = 0.0 if code == "SSS304" else 2e-6
+    floor = Neighbour("floor", beside(gap).mesh, translucent=False)
+    assert result_of(code, shapes.box(), in_scene(beside(gap))).outcome == Outcome.FAIL
+    assert result_of(code, shapes.box(), in_scene(floor)).outcome == Outcome.PASS
+
+
+def test_what_encloses_nothing_overlaps_nothing():
+    box = shapes.box()
+    result = result_of("SSS304", Mesh(box.vertices, box.faces[:2]), in_scene(beside(0.0)))
+    assert (result.outcome, result.reason) == (Outcome.NOT_RUN, "the mesh encloses no volume")

@@ -99,7 +99,7 @@ def test_rules_that_need_a_material_or_a_scene_are_not_run_without():
     reasons = {rule.code: rule.reason for rule in check_mesh(shapes.box()).rules if rule.outcome == "not-run"}
     assert reasons == {
         "SSS304": "no scene",
-        "SSS404": "no material",
+        "SSS404": "no scene and no material",
         "SSS501": "no material",
         "SSS502": "no material",
         "SSS503": "no scene",
