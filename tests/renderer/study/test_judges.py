@@ -14,6 +14,7 @@ from renderer.study.judges import (
     sidak,
     symmetric_error,
     uniform_p,
+    with_rare_samples,
 )
 from sss_tools.errors import InputError
 from tests.assertions import assert_distribution, assert_mean, seed
@@ -170,6 +171,25 @@ def test_what_is_not_finite_raises_the_alarm(random):
     image = observed(random)
     image.mean[3, 3, 1] = np.nan
     assert not compare_tiles(image, observed(random)).agrees
+
+
+def rarely_lit(random, passes):
+    """One sample in 20,000 carries a third of the light."""
+    rare = random.binomial(passes, 5e-5, SHAPE) / 5e-5
+    mean = truth() * (random.normal(2 / 3, 0.1 / np.sqrt(passes), SHAPE) + rare / 3 / passes)
+    variance = truth() ** 2 * (0.01 + (rare / passes) * (1 - rare * 5e-5 / passes) / 9 / 5e-5)
+    return Estimate(mean, np.sqrt(variance / passes), passes)
+
+
+def test_rare_bright_samples_raise_no_false_alarms_once_they_are_reckoned_with(random):
+    """100 samples a pixel have met one in every third tile. 20 pairs at 1e-3; without the remedy all raise alarms."""
+    plain = cautious = 0
+    for _ in range(20):
+        image, reference = rarely_lit(random, 100), rarely_lit(random, 60000)
+        plain += not compare_tiles(image, reference).agrees
+        cautious += not compare_tiles(with_rare_samples(image, 100, reference, 60000), reference).agrees
+    assert plain == 20
+    assert cautious <= 1
 
 
 def test_pictures_without_noise_are_compared_exactly():
