@@ -66,7 +66,8 @@ def ours(options: argparse.Namespace) -> dict:
         ended = time.time()
         return ended - begun > options.seconds and renderer.film.passes >= 8
 
-    renderer.run(count(), done)
+    # as for --time: fewer passes at once towards the end, for what is under way then is lost
+    renderer.run(count(), done, lambda: begun + options.seconds - time.time())
     film = renderer.film
     return {
         "mean": film.mean(),
