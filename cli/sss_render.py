@@ -34,8 +34,11 @@ def _render(argv: Sequence[str] | None) -> int:
     if arguments[:1] == ["merge"]:
         return _merge(arguments[1:])
     started = process_start()
-    options = _parser().parse_args(arguments)
+    parser = _parser()
+    options = parser.parse_args(arguments)
     _refuse(options)
+    if options.export is not None:
+        return _export(options, parser)
 
     from renderer.job import execute, guide_arrays, report
     from renderer.output.image import check_writable
@@ -109,6 +112,8 @@ def _parser() -> ArgumentParser:
     parser.add_argument("--resume", action="store_true", help="go on with an unfinished render")
     parser.add_argument("--aov", type=lambda text: text.split(","), default=[], metavar="LIST",
                         help="further arrays for exr and npz: depth, normal")  # fmt: skip
+    parser.add_argument("--export", choices=("mitsuba",), metavar="mitsuba",
+                        help="only write the scene for Mitsuba 3: -o FILE.xml, and a folder beside it")  # fmt: skip
     parser.add_argument("--report", type=Path, metavar="FILE.json", help="what was done, and how long it took")
     return parser
 
@@ -121,6 +126,33 @@ def _refuse(options: Any) -> None:
         raise unavailable("--hole-handling cap", "use terminate")
     if options.material is not None and _is_scene(options.scene):
         raise InputError("--material", "is for bare meshes", "set the material in the scene file")
+
+
+_FOR_EXPORT = {"scene", "output", "export", "passes", "seed", "size", "material", "unit", "quiet", "verbose"}
+
+
+def _export(options: Any, parser: ArgumentParser) -> int:
+    """Write the scene for another renderer."""
+    for name, value in vars(options).items():
+        if name not in _FOR_EXPORT and value != parser.get_default(name):
+            raise InputError(
+                f"--{name.replace('_', '-')}", f"says nothing to --export {options.export}", "leave it out"
+            )
+
+    from renderer.export import files
+    from renderer.export.mitsuba import to_mitsuba
+    from renderer.job import DEFAULT_PASSES
+    from renderer.scene.admission import admit
+
+    files.check_target(options.output)
+    scene, _ = admit(_scene(options))
+    export = to_mitsuba(scene, files.folder_name(options.output), options.passes or DEFAULT_PASSES, options.seed)
+    for warning in export.warnings:
+        complain(PROGRAM, warning, "warning")
+    files.write(export, options.output)
+    if not options.quiet:
+        print(f"{options.output}: written for Mitsuba 3, with {len(export.files)} file(s) beside it")
+    return 0
 
 
 def _is_scene(path: Path) -> bool:

@@ -331,3 +331,20 @@ def test_real_meshes_are_checked_and_rendered(shared, tmp_path, capsys, name):
         # the mesh is framed: it fills a good part of the picture, and is not black
         assert (arrays["object_id"] == 0).mean() > 0.1
         assert arrays["image"][arrays["object_id"] == 0].mean() > 0.01
+
+
+def test_export_writes_the_scene_for_mitsuba_and_renders_nothing(workplace, capsys):
+    assert main(["scene.toml", "--export", "mitsuba", "-o", "other.xml", "--passes", "7", "--size", "30x20"]) == 0
+    document = Path("other.xml").read_text()
+    assert '<default name="spp" value="7" />' in document and '<integer name="width" value="30" />' in document
+    assert sorted(path.name for path in workplace.iterdir()) == ["ball.ply", "other.xml", "other_files", "scene.toml"]
+    assert "written for Mitsuba 3" in capsys.readouterr().out
+    assert main(["ball.ply", "--export", "mitsuba", "-o", "bare.xml", "-q"]) == 0
+    assert capsys.readouterr().out == ""
+
+
+@pytest.mark.parametrize("option", [["--time", "3"], ["--shader", "path"], ["--resume"], ["--report", "r.json"]])
+def test_export_refuses_options_that_it_would_ignore(workplace, capsys, option):
+    assert main(["scene.toml", "--export", "mitsuba", "-o", "other.xml", *option]) == 2
+    assert f"{option[0]}: says nothing to --export mitsuba" in capsys.readouterr().err
+    assert not Path("other.xml").exists()

@@ -26,6 +26,9 @@ from sss_tools.medium import Medium
 from sss_tools.mesh import Mesh
 from sss_tools.shapes import icosphere
 
+TOGETHER = 2**18
+"""Camera samples that are traced at once."""
+
 WHITE_SKY = EnvironmentLight(radiance=np.ones(3))
 
 
@@ -106,8 +109,11 @@ def picture(of: Scene, passes: int, **how) -> Picture:
     """Render with ``wavefront(of, **how)``."""
     width, height = of.camera.resolution
     tracer, tally, parts = wavefront(of, **how), Tally(), []
-    for index in range(passes):
-        parts.append(tracer.trace(index, 0, width * height))
+    # many passes at once keep blocks full
+    together = max(TOGETHER // (width * height), 1)
+    for first in range(0, passes, together):
+        parts.append(tracer.trace(first, 0, width * height, min(together, passes - first)))
         tally.add(parts[-1].tally)
-    samples = np.stack([part.radiance for part in parts]).astype(float)
-    return Picture(samples, np.stack([part.first_object for part in parts]), tally)
+    passes_of_parts = [part.of_pass(k) for part in parts for k in range(part.passes)]
+    samples = np.stack([radiance for radiance, _ in passes_of_parts]).astype(float)
+    return Picture(samples, np.stack([first for _, first in passes_of_parts]), tally)
