@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ..closedness import ENCLOSES
+from ..enclosure import ENCLOSES
 from ..seams import SEAM_TOLERANCE, edges_closed_by_welding
 from .outcome import FixSafety, Severity
 from .rule import Finding, Rule, Subject, plural
