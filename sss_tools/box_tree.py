@@ -10,7 +10,7 @@ others.
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import TypeVar
 
@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Indices = NDArray[np.int64]
+Item = TypeVar("Item")
 Result = TypeVar("Result")
 
 LEAF = 8
@@ -109,9 +110,7 @@ class BoxTree:
                 for pair in _split(*leaves, LEAF_BLOCK)
             ]
 
-        workers = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-        with ThreadPoolExecutor(min(workers, 8)) as pool:
-            return [result for results in pool.map(search, blocks) for result in results]
+        return [result for results in in_threads(search, blocks) for result in results]
 
     def _descend(self, level: int, a: Indices, b: Indices) -> Iterator[tuple[Indices, Indices]]:
         """Pairs of overlapping leaves below overlapping nodes."""
@@ -153,6 +152,15 @@ class BoxTree:
             differ = self._group.take(a) != self._group.take(b)
             a, b = a[differ], b[differ]
         return a, b
+
+
+def in_threads(function: Callable[[Item], Result], items: Sequence[Item]) -> list[Result]:
+    """The function's results, in the order of the items, from as many threads as there are processors, up to 8."""
+    workers = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    if workers == 1 or len(items) < 2:
+        return [function(item) for item in items]
+    with ThreadPoolExecutor(min(workers, len(items), 8)) as pool:
+        return list(pool.map(function, items))
 
 
 def _children(a: Indices, b: Indices) -> tuple[Indices, Indices]:

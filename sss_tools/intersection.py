@@ -7,10 +7,12 @@ predicates that do not round.
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 from numpy.typing import NDArray
 
-from .box_tree import BoxTree
+from .box_tree import BoxTree, in_threads
 from .topology import Topology
 from .triangle_pairs import apart, fold_over_side, meet, meet_beyond_corner, without_area
 
@@ -70,7 +72,8 @@ class _Search:
         for test, *candidates in zip((self._disjoint, self._at_corner, self._at_side), *sieved, strict=True):
             a, b = (np.concatenate(side) for side in zip(*candidates, strict=True))
             # together, as each test takes a hundred steps that cost more than a few pairs do
-            found += [test(a[block], b[block]) for block in _blocks(len(a))]
+            blocks = [(a[block], b[block]) for block in _blocks(len(a))]
+            found += in_threads(partial(_apply, test), blocks)
         return np.concatenate(found)
 
     def _sieve(self, a, b) -> list[tuple[Indices, Indices]]:
@@ -115,6 +118,11 @@ class _Search:
         return np.stack([self.exact.take(row, axis=1) for row in points])
 
 
+def _apply(test, pairs):
+    """A test's verdict on two arrays of places, handed over as one."""
+    return test(*pairs)
+
+
 def _shared_first(mine, theirs):
     """(3, n) corners with those that ``theirs`` has, too, in front, in the order of their numbers."""
     own = np.stack([(corner != theirs).all(axis=0) for corner in mine])
@@ -134,7 +142,8 @@ class _Measures:
         count = faces.shape[1]
         self.lower, self.upper = np.empty((3, count), np.float32), np.empty((3, count), np.float32)
         self.vectors, self.slack, self.sound = np.empty((3, count)), np.empty(count), np.empty(count, bool)
-        for block in _blocks(count):
+
+        def measure(block):
             a, b, c = (points.take(row, axis=1) for row in faces[:, block])
             # rounds each to nearest, which keeps their order
             np.minimum(np.minimum(a, b), c, out=self.lower[:, block], casting="same_kind")
@@ -147,6 +156,8 @@ class _Measures:
             longest = 2 * _largest(np.maximum(np.abs(u), np.abs(v)))
             np.add(2.0**-44 * longest * longest, 2.0**-47 * longest, out=self.slack[block])
             np.greater(_largest(np.abs(vectors)), 16 * self.slack[block], out=self.sound[block])
+
+        in_threads(measure, _blocks(count))
 
 
 def _largest(rows):
@@ -200,8 +211,10 @@ def _spreads_out(topology: Topology, centred, faces, measures: _Measures):
 
     spreads = np.ones(count, bool)
     spreads[topology.edges[topology.faces_per_edge != 2]] = False
-    once = []
-    for block in _blocks(len(slack)):
+
+    def look(block):
+        """Points at which a face of the block turns past the direction that turns are counted at."""
+        turned = []
         places = [centred.take(row, axis=1) for row in faces[:, block]]
         vector, allowed = vectors[:, block], slack[block]
         for k in range(3):
@@ -215,6 +228,8 @@ def _spreads_out(topology: Topology, centred, faces, measures: _Measures):
             (ux, uy, uz), (vx, vy, vz) = places[(k + 1) % 3] - places[k], places[(k + 2) % 3] - places[k]
             start = x * np.where(upright, uz, uy) - minus * ux
             end = x * np.where(upright, vz, vy) - minus * vx
-            once.append(point[(start < 0) & (end >= 0)])
-    turns = np.bincount(np.concatenate(once), minlength=count)
+            turned.append(point[(start < 0) & (end >= 0)])
+        return np.concatenate(turned)
+
+    turns = np.bincount(np.concatenate(in_threads(look, _blocks(len(slack)))), minlength=count)
     return spreads & (turns == 1)
