@@ -53,7 +53,7 @@ def near_faces(mesh: Mesh, other: Mesh, distance: float) -> tuple[Indices, float
     lower = np.concatenate([corners[0].min(axis=1) - distance, corners[1].min(axis=1)])
     upper = np.concatenate([corners[0].max(axis=1) + distance, corners[1].max(axis=1)])
     count = len(mesh.faces)
-    tree = BoxTree(lower, upper, (np.arange(len(lower)) >= count).astype(np.int64))
+    tree = BoxTree(lower.T, upper.T, (np.arange(len(lower)) >= count).astype(np.int64))
     found = tree.for_each_block(lambda a, b: np.stack([tree.order[a], tree.order[b]], axis=1))
     pairs = np.sort(np.concatenate([np.zeros((0, 2), np.int64), *found]), axis=1)
     first, second = corners[0][pairs[:, 0]], corners[1][pairs[:, 1] - count]

@@ -68,8 +68,11 @@ class Mesh:
         """(2, 3) least and greatest coordinates of the vertices that faces use; zeros without faces."""
         if len(self.faces) == 0:
             return np.zeros((2, 3))
-        used = self.vertices[np.unique(self.faces)]
-        return np.stack([used.min(axis=0), used.max(axis=0)])
+        used = np.zeros(len(self.vertices), bool)
+        used[self.faces] = True
+        # by columns: reducing rows of three is ten times slower
+        columns = [column[used] for column in self.vertices.T]
+        return np.array([[column.min() for column in columns], [column.max() for column in columns]])
 
     @property
     def diagonal(self) -> float:
@@ -97,6 +100,17 @@ class Mesh:
         """(m, 3) unit outward normals; zero for faces without area."""
         length = 2 * self.face_areas[:, None]
         return np.divide(self.face_vectors, length, out=np.zeros_like(self.face_vectors), where=length > 0)
+
+    @cached_property
+    def longest_sides(self) -> NDArray[np.float64]:
+        """(m,) length of each face's longest side, mesh units."""
+        a, b, c = (np.ascontiguousarray(column) for column in self.faces.T)
+        squares = [np.zeros(len(self.faces)) for _ in range(3)]
+        for column in self.vertices.T:
+            x, y, z = column.take(a), column.take(b), column.take(c)
+            for square, difference in zip(squares, (x - y, y - z, z - x), strict=True):
+                square += difference * difference
+        return np.sqrt(np.maximum(np.maximum(*squares[:2]), squares[2]))
 
     @property
     def area(self) -> float:

@@ -51,8 +51,9 @@ class Parts:
         self.volumes, self.areas = np.empty(self.count), np.empty(self.count)
         for number, group in enumerate(self.groups):
             corners = self.points[self.faces[group]]
-            box = corners.reshape(-1, 3)
-            self.lower[number], self.upper[number] = box.min(axis=0), box.max(axis=0)
+            columns = corners.reshape(-1, 3).T
+            self.lower[number] = [column.min() for column in columns]
+            self.upper[number] = [column.max() for column in columns]
             vectors = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
             # about the middle: far from the origin the tetrahedra would cancel to nothing
             first = corners[:, 0] - (self.lower[number] + self.upper[number]) / 2

@@ -21,39 +21,36 @@ Centring rounds each coordinate by at most 2**-54 and a dot product with a unit 
 3 * sqrt(3) * 2**-53, on both triangles: less than 2**-49 together."""
 
 
-def apart(first: Corners, second: Corners) -> Verdicts:
-    """(n,) whether an axis separates two triangles for certain; False where that is not sure.
+def apart(first, second) -> Verdicts:
+    """(n,) whether an axis separates two triangles, (3, 3, n) each, for certain; False where that is not sure.
 
-    Tries the way from middle to middle, the normals, and the normals of the sides in each triangle's plane.
+    Tries the normals, the way from middle to middle, and the normals of the sides in each triangle's plane.
     An axis need not be accurate to separate: only the projections are bounded.
     """
-    result = np.zeros(first.shape[2], bool)
-    todo = np.arange(first.shape[2])
+    result = np.zeros(len(first[0][0]), bool)
+    todo = np.arange(len(result))
     for axis_of in _axes():
-        axis = axis_of(first, second)
-        length = np.sqrt(axis[0] * axis[0] + axis[1] * axis[1] + axis[2] * axis[2])
-        margin = SEPARATION * length
-        one, other = _along(axis, first), _along(axis, second)
-        separated = (one.min(axis=0) - other.max(axis=0) > margin) | (other.min(axis=0) - one.max(axis=0) > margin)
-        result[todo[separated]] = True
-        keep = np.flatnonzero(~separated)
-        todo, first, second = todo[keep], first[:, :, keep], second[:, :, keep]
+        x, y, z = axis_of(first, second)
+        margin = SEPARATION * (np.abs(x) + np.abs(y) + np.abs(z))
+        (a, b, c), (d, e, f) = ([p[0] * x + p[1] * y + p[2] * z for p in corners] for corners in (first, second))
+        gap = np.minimum(np.minimum(a, b), c) - np.maximum(np.maximum(d, e), f)
+        np.maximum(gap, np.minimum(np.minimum(d, e), f) - np.maximum(np.maximum(a, b), c), out=gap)
+        keep = np.flatnonzero(gap <= margin)
+        result[todo] = True
+        todo = todo[keep]
+        result[todo] = False
+        first, second = ([corner.take(keep, axis=1) for corner in corners] for corners in (first, second))
     return result
 
 
 def _axes():
     """The axes tried, one function of the two triangles each."""
-    yield lambda first, second: second.sum(axis=0) - first.sum(axis=0)
     yield lambda first, second: _normal(first)
     yield lambda first, second: _normal(second)
+    yield lambda first, second: second[0] + second[1] + second[2] - first[0] - first[1] - first[2]
     for k in range(3):
         yield lambda first, second, k=k: _cross(_normal(first), first[(k + 1) % 3] - first[k])
         yield lambda first, second, k=k: _cross(_normal(second), second[(k + 1) % 3] - second[k])
-
-
-def _along(axis, corners):
-    """(3, n) places of the corners along an axis (3, n)."""
-    return corners[:, 0] * axis[0] + corners[:, 1] * axis[1] + corners[:, 2] * axis[2]
 
 
 def _normal(corners):

@@ -59,8 +59,7 @@ def find_unreferenced_vertices(subject: Subject) -> Finding | None:
 
 def _measures(subject: Subject) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Longest side and least height of each face, (m,) each, mesh units."""
-    corners = subject.mesh.vertices[subject.mesh.faces]
-    longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
+    longest = subject.mesh.longest_sides
     height = np.divide(2 * subject.mesh.face_areas, longest, out=np.zeros_like(longest), where=longest > 0)
     return longest, height
 

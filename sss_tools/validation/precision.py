@@ -15,10 +15,15 @@ shorter edges turn by up to a quarter of a radian and more, or vanish."""
 def find_unresolved_vertices(subject: Subject) -> Finding | None:
     """Vertices joined by edges that single precision cannot resolve here, but could at the origin."""
     topology = subject.topology
-    ends = topology.points[topology.edges]
-    length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
-    here = _spacing(np.abs(ends).max(axis=(1, 2)))
-    centred = _spacing(np.abs(ends - subject.mesh.bounds.mean(axis=0)).max(axis=(1, 2)))
+    start, end = (np.ascontiguousarray(points) for points in topology.edges.T)
+    places = topology.points.T
+    square = np.zeros(len(start))
+    for place in places:
+        difference = place.take(end) - place.take(start)
+        square += difference * difference
+    length = np.sqrt(square)
+    spacings = (_spacing(_largest(np.abs(p))) for p in (places, places - subject.mesh.bounds.mean(axis=0)[:, None]))
+    here, centred = (np.maximum(spacing.take(start), spacing.take(end)) for spacing in spacings)
     edges = np.flatnonzero((length < SPACINGS * here) & (length >= SPACINGS * centred))
     if len(edges) == 0:
         return None
@@ -30,6 +35,11 @@ def find_unresolved_vertices(subject: Subject) -> Finding | None:
         vertices=vertices,
         edges=subject.edge_vertices(edges),
     )
+
+
+def _largest(coordinates):
+    """(n,) largest of each point's three coordinates (3, n)."""
+    return np.maximum(np.maximum(coordinates[0], coordinates[1]), coordinates[2])
 
 
 def _spacing(magnitude):
