@@ -18,7 +18,7 @@ from .output import image, passes
 from .output.film import Film
 from .output.image import Picture
 from .render import Renderer
-from .scene.description import DirectionalLight, PointLight, Translucent
+from .scene.description import DirectionalLight, PointLight, SceneObject, Translucent
 
 DEFAULT_PASSES = 64
 CHECKPOINT_EVERY = 1.0
@@ -192,13 +192,31 @@ def light_methods(renderer: Renderer) -> list[dict[str, str]]:
         elif thing.material.roughness > 0:
             method, bias = "next-event estimation through the rough boundary", "none"
         else:
-            method = "diffuse exit: transmitted light is taken to enter where the path leaves"
-            bias = (
-                "a half-space within 3 %; a ball of radius 20, 5, 2 transport mean free paths 2-3, 6-8, 11-16 % RMS "
-                "of the maximum, darker at the terminator, brighter at the lit pole"
-            )
+            method, bias = _through_facets(renderer, thing)
         methods.append({"object": thing.name, "method": method, "known_bias": bias})
     return methods
+
+
+def _through_facets(renderer: Renderer, thing: SceneObject) -> tuple[str, str]:
+    """Method and bias behind a smooth boundary."""
+    traced = renderer.traced
+    index = renderer.scene.objects.index(thing)
+    mine = [beams for beams in traced.beams if traced.triangle_object[beams.first_triangle] == index]
+    mirrored = min(len(beams.generations) for beams in mine) - 1
+    missing = max(float(beams.missing.max()) for beams in mine)
+    method = "next-event estimation through each facet"
+    if mirrored:
+        method += f", also after {mirrored} reflection{'s' * (mirrored > 1)} inside"
+    bias = (
+        f"light reflected inside {'more often ' * bool(mirrored)}before its first collision is not found: "
+        f"{100 * missing:.2g} % of what enters"
+    )
+    if thing.normals == "smooth":
+        bias += "; light is bent at flat facets, the camera's rays at interpolated normals"
+    slot = [one.index for one in traced.translucent].index(index)
+    if traced.holds_light[:, slot].any():
+        bias += "; of a light inside, all that the boundary reflects before its first collision"
+    return method, bias
 
 
 def peak_memory() -> int | None:

@@ -14,7 +14,7 @@ from ..tracing.traced_scene import TracedScene, offset_from
 from .crossings import Crossings
 from .local_frame import LocalFrame
 from .lost_paths import lose
-from .point_light import light_exits, light_rough
+from .point_light import light_rough
 
 Float32 = NDArray[np.float32]
 
@@ -70,8 +70,6 @@ def meet_boundary(
         turned[:, smooth], reflected[smooth] = _turn(
             at.direction[:, smooth], at.facing[:, smooth], at.eta[smooth], choice[smooth], paths, at.index[smooth]
         )
-        if scene.lights.points:
-            light_exits(scene, paths, at.take(smooth[~reflected[smooth]]), tally, radiance)
     for slot, thing in enumerate(scene.translucent) if rough.any() else ():
         mine = np.flatnonzero(rough & (at.slot == slot))
         if len(mine):
@@ -87,9 +85,6 @@ def meet_boundary(
     crossed = at.index[~reflected]
     paths.inside[:, crossed] = at.inside_beyond[:, ~reflected]
     paths.owner[crossed] = at.beyond[~reflected]
-    # what happened in clear or index-matched surroundings does not make a path one that comes from a body's inside
-    entered = ~reflected & (scene.media.ior[at.before] == 1) & ~straight
-    paths.scattered[at.index] &= ~entered
     paths.lit[at.index] &= straight
     paths.direction[:, at.index] = turned
     side = np.where(reflected, np.float32(1), np.float32(-1))

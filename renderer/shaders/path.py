@@ -30,8 +30,9 @@ from ..tracing.roulette import play_at_collisions
 from ..tracing.streams import Uniforms
 from ..tracing.tally import Tally
 from ..tracing.traced_scene import MISS, TracedScene
-from . import point_light
 from .lost_paths import lose
+from .point_light import light_collisions
+from .refracted_light import light_through_facets
 
 NAME = "path"
 
@@ -61,7 +62,12 @@ class MediumWalk:
         self._albedo = media.albedo[:, slot, None]
         self._achromatic = bool((self._sigma_t == self._sigma_t[0]).all())
         self._g = media.g[slot]
-        self._lit_inside = bool(scene.lights.points) and media.ior[slot] == 1
+        lit = media.ior[slot] == 1 or scene.holds_light[:, slot].any()
+        self._lit_inside = bool(scene.lights.points) and bool(lit)
+        self._lit_through_facets = any(np.float32(beams.ior) == media.ior[slot] for beams in scene.beams)
+        if self._lit_through_facets:
+            # the collisions that a jump leaves out would not be connected
+            self._jumps = None
         thing = scene.translucent[slot]
         # rounded positions on a flat side of the box are not outside
         self._centre = (thing.lower + thing.upper) / 2
@@ -101,7 +107,6 @@ class MediumWalk:
             # the flight's density cancels extinction; what is left at a collision is the albedo
             paths.throughput *= self._albedo
         paths.flies_on[:] = False
-        paths.scattered[:] = True
         paths.lit[:] = False
         paths.surfaces[:] = 0
         paths.branch[:] = CHANCE
@@ -113,7 +118,10 @@ class MediumWalk:
         collided = ~paths.flies_on
         self.tally.collisions += int(np.count_nonzero(collided))
         if self._lit_inside:
-            point_light.light_collisions(self.scene, paths, collided.nonzero()[0], self.slot, self.tally, radiance)
+            light_collisions(self.scene, paths, collided.nonzero()[0], self.slot, self.tally, radiance)
+        if self._lit_through_facets:
+            index = collided.nonzero()[0]
+            light_through_facets(self.scene, paths, index, self.slot, self._uniforms, self.tally, radiance)
         play_at_collisions(paths, self._uniforms)
         paths.bury()
 

@@ -1,7 +1,7 @@
 """Light without extent, which no path can meet by chance: points and parallel beams.
 
 Where the boundary is invisible it is connected to collisions, at rough boundaries to the boundary, both without
-bias. Behind smooth boundaries it is approximated where paths leave.
+bias. Behind smooth boundaries it is connected through their facets, see ``refracted_light``.
 """
 
 from __future__ import annotations
@@ -9,7 +9,6 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ..optics.dielectric import diffuse_external_reflectance, transmittance
 from ..optics.microfacet import scatter
 from ..optics.phase import henyey_greenstein
 from ..tracing.paths import Paths
@@ -26,21 +25,25 @@ Float32 = NDArray[np.float32]
 def light_collisions(
     scene: TracedScene, paths: Paths, index: NDArray[np.intp], slot: int, tally: Tally, radiance: Float32
 ) -> None:
-    """Light the collisions of the paths ``index`` in the medium ``slot``, which lies behind an invisible boundary.
+    """Light the collisions of the paths ``index`` in the medium ``slot``, from where light comes straight on.
 
-        w p(mu) E0 exp(-optical depth), w with this collision's albedo
+        w p(mu) E0 exp(-optical depth) / ior^2, w with this collision's albedo
 
+    That is through invisible boundaries, or from a light in the same medium.
     ``paths.direction`` must still be the one before the collision.
     """
     if not len(index):
         return
     media = scene.media
     position, direction, sample = paths.origin[:, index], paths.direction[:, index], paths.sample[index]
-    for source in scene.lights.points:
+    ior = float(media.ior[slot])
+    for number, source in enumerate(scene.lights.points):
+        if ior != 1 and not scene.holds_light[number, slot]:
+            continue
         light = source.illuminate(position)
         phase = henyey_greenstein(np.einsum("ij,ij->j", direction, light.direction), media.g[slot])
         visible = shadow_transmittance(scene, media, position, light, paths.inside[:, index], paths.owner[index], tally)
-        radiance[:, sample] += paths.throughput[:, index] * light.irradiance * (phase * visible)
+        radiance[:, sample] += paths.throughput[:, index] * light.irradiance * (phase * visible / (ior * ior))
 
 
 def light_rough(
@@ -68,34 +71,3 @@ def light_rough(
                 scene, some.position, some.near_normal * side, pick(light, useful), inside, owner[useful], tally
             )
             radiance[:, paths.sample[some.index]] += paths.throughput[:, some.index] * arrived * value[useful]
-
-
-def light_exits(scene: TracedScene, paths: Paths, at: Crossings, tally: Tally, radiance: Float32) -> None:
-    """Light the points where scattered paths leave a smooth boundary from inside.
-
-    Such light cannot be connected straight on. The exit is taken for diffuse: by reciprocity the light enters here
-    with T(x), x = N.L, and spreads like diffuse light,
-
-        w E0 max(x, 0) T(x) / (pi (1 - Fe))
-
-    the separable form of the BSSRDF (Jensen et al. 2001, eq. 5). Energy is exact in a furnace; the sideways shift of
-    the refracted beam is lost: 2-3 % on bodies of 20 transport mean free paths radius, 11-16 % at 2.
-    """
-    ior = scene.media.ior
-    leaves = (ior[at.beyond] == 1) & (ior[at.before] != 1) & paths.scattered[at.index]
-    at = at.take(np.flatnonzero(leaves))
-    if not len(at.index):
-        return
-    normal, inner = -at.near_normal, ior[at.before]
-    share = np.array([1 - diffuse_external_reflectance(float(index)) for index in ior], np.float32)[at.before]
-    for source in scene.lights.points:
-        light = source.illuminate(at.position)
-        x = np.einsum("ij,ij->j", normal, light.direction)
-        lit = np.flatnonzero(x > 0)
-        if len(lit):
-            some = at.take(lit)
-            arrived = received(
-                scene, some.position, normal[:, lit], pick(light, lit), some.inside_beyond, some.beyond, tally
-            )
-            spread = x[lit] * transmittance(x[lit], inner[lit]) / (np.float32(np.pi) * share[lit])
-            radiance[:, paths.sample[some.index]] += paths.throughput[:, some.index] * arrived * spread

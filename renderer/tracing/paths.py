@@ -28,7 +28,6 @@ class Paths:
     triangle    (n,) int32 where the path stands, for paths on surfaces
     inside      (k, n) int8 how many times inside each of the k translucent objects: entered minus left
     owner       (n,) int16 which of the k owns the medium here (the first that the path is inside of), -1 outside
-    scattered   (n,) bool, whether the path has collided since a boundary last bent it inwards
     lit         (n,) bool, whether area lights were already sampled from the last vertex, so that meeting one
                 now must not count again
     flies_on    (n,) bool, in media: whether the direction is that of the next flight, and not that before a collision
@@ -50,7 +49,6 @@ class Paths:
             "triangle": np.empty(capacity, np.int32),
             "inside": np.empty((max(translucent_objects, 1), capacity), np.int8),
             "owner": np.empty(capacity, np.int16),
-            "scattered": np.empty(capacity, bool),
             "lit": np.empty(capacity, bool),
             "flies_on": np.empty(capacity, bool),
             "branch": np.empty(capacity, np.int8),
@@ -72,7 +70,7 @@ class Paths:
         )
         self.faint, self.stream, self.sample = store["faint"], store["stream"], store["sample"]
         self.triangle, self.inside, self.owner = store["triangle"], store["inside"], store["owner"]
-        self.scattered, self.lit, self.branch = store["scattered"], store["lit"], store["branch"]
+        self.lit, self.branch = store["lit"], store["branch"]
         self.flies_on, self.surfaces, self.alive = store["flies_on"], store["surfaces"], store["alive"]
 
     @property
@@ -95,7 +93,7 @@ class Paths:
         store["faint"][new] = ROULETTE_BELOW
         store["inside"][:, new] = 0
         store["owner"][new] = OUTSIDE
-        store["scattered"][new] = store["lit"][new] = store["flies_on"][new] = False
+        store["lit"][new] = store["flies_on"][new] = False
         store["branch"][new] = WHOLE
         store["surfaces"][new] = 0
         store["alive"][new] = True

@@ -32,12 +32,28 @@ def transmittance(
     surface, light sources included, blocks it. ``position`` must already be offset off its surface; ``inside`` (k, n)
     and ``owner`` (n,) say where it is (see ``Paths``).
     """
+    return follow(scene, media, position, light, inside, owner, tally)[0]
+
+
+def follow(
+    scene: TracedScene,
+    media: MediaTable,
+    position: Float32,
+    light: Illumination,
+    inside: NDArray[np.int8],
+    owner: NDArray[np.int16],
+    tally: Tally,
+) -> tuple[Float32, NDArray[np.int8], NDArray[np.int16]]:
+    """``transmittance``, and ``inside`` and ``owner`` at the light's end, which mean nothing where it is 0."""
     n = position.shape[1]
     result = np.zeros((3, n), np.float32)
+    inside_there, owner_there = np.zeros((inside.shape[0], n), np.int8), np.zeros(n, np.int16)
     active = np.arange(n)
     origin, direction = position, light.direction
     remaining = np.where(np.isfinite(light.distance), light.distance * _SHORT_OF_LIGHT - 4 * RAY_OFFSET, MISS)
     remaining = np.maximum(remaining, 0).astype(np.float32)
+    # what lies between the ray's end and the light is met by no ray, but attenuates
+    short = np.where(np.isfinite(light.distance), light.distance - remaining, 0).astype(np.float32)
     depth = np.zeros((3, n), np.float32)
     inside, owner = inside.copy(), owner.copy()
     for sphere in scene.lights.spheres:
@@ -52,9 +68,12 @@ def transmittance(
         hit = triangle >= 0
         # a ray that ends inside an object without having met its surface leaked; attenuation takes it away
         reach = np.minimum(distance, np.float32(1e6))
-        depth += media.of(media.sigma_t, owner) * reach
+        extinction = media.of(media.sigma_t, owner)
+        depth += extinction * reach
         done = ~hit
-        result[:, active[done]] = np.exp(-depth[:, done])
+        there = active[done]
+        result[:, there] = np.exp(-depth[:, done] - extinction[:, done] * short[there])
+        inside_there[:, there], owner_there[there] = inside[:, done], owner[done]
         if not hit.any():
             break
         slot = np.take(scene.slot_of_triangle, triangle)
@@ -71,7 +90,7 @@ def transmittance(
         landing = scene.on_plane(origin[:, keep] + distance * direction, triangle[straight])
         origin = offset_from(landing, normal[:, straight], cosine[straight])
         remaining = np.where(remaining[keep] < MISS, np.maximum(remaining[keep] - distance, 0), MISS)
-    return result
+    return result, inside_there, owner_there
 
 
 def cross(inside: NDArray[np.int8], slot: NDArray[np.intp], entering: NDArray[np.bool_]) -> NDArray[np.int16]:

@@ -13,8 +13,11 @@ from sss_tools.mesh import Mesh
 from sss_tools.rays import RAY_OFFSET, RayCaster, UnitFrame
 
 from ..scene.description import Scene, SceneObject, Translucent
-from ..scene.lights import LightSet
+from ..scene.lights import LightSet, PointSource
+from .beam_generation import Facets
 from .media import MediaTable
+from .refracted_beams import RefractedBeams
+from .unscattered import mirror_as_needed
 
 Float32 = NDArray[np.float32]
 MISS = np.float32(1e37)
@@ -68,6 +71,8 @@ class TracedScene:
     slot_of_triangle (t,) slot, -1 for lights, opaque objects and those with a faster shader
     reflectance      (3, objects) colour of each object
     frame            between the frame and scene units
+    beams            light without extent behind smooth boundaries, one for each object and light
+    holds_light      (points, slots + 1) bool, whether the object's box holds the place of a light without extent
     """
 
     def __init__(self, scene: Scene, shaders: list[str], hole_handling: list[str]):
@@ -112,6 +117,30 @@ class TracedScene:
         slot_of_object = np.full(len(self.objects) + 1, -1)
         slot_of_object[[thing.index for thing in self.translucent]] = np.arange(len(self.translucent))
         self.slot_of_triangle = slot_of_object[self.triangle_object]
+        self.beams = [
+            self._beams(thing, corners, normals, source)
+            for thing in self.translucent
+            for source in self.lights.points
+            if thing.medium is not None and thing.medium.ior != 1 and thing.roughness == 0
+        ]
+
+        self.holds_light = np.zeros((len(self.lights.points), self.media.count + 1), bool)
+        for row, source in zip(self.holds_light, self.lights.points, strict=True):
+            if isinstance(source, PointSource):
+                for slot, thing in enumerate(self.translucent):
+                    within = (source.position > thing.lower) & (source.position < thing.upper)
+                    row[slot] = within.all()
+
+    def _beams(self, thing: TracedObject, corners, normals, source) -> RefractedBeams:
+        first = thing.first_triangle
+        mine = slice(first, first + len(self.scene.objects[thing.index].mesh.faces))
+        assert thing.medium is not None
+        # faces without area have no normal, and light nothing
+        facets = Facets(first, corners[mine], normals[mine])
+        sigma_t = np.asarray(thing.medium.sigma_t, float)
+        beams = RefractedBeams(facets, thing.medium.ior, source, float(sigma_t.min()), thing.lower, thing.upper)
+        mirror_as_needed(self.caster, facets, beams, sigma_t)
+        return beams
 
     def _traced(self, index: int, thing: SceneObject, shader: str, handling: str) -> TracedObject:
         material = thing.material

@@ -165,7 +165,7 @@ def test_the_bias_of_lights_without_extent_is_named_where_there_is_one():
     assert light_methods(ready()) == []
     assert light_methods(ready((SUN,), shader="plumb")) == []
     (smooth,) = light_methods(ready((SUN,)))
-    assert smooth["object"] == "ball" and "diffuse exit" in smooth["method"] and "%" in smooth["known_bias"]
+    assert smooth["object"] == "ball" and "each facet" in smooth["method"] and "%" in smooth["known_bias"]
     point = PointLight(np.array([3.0, 3, 3]), np.ones(3))
     for material in (translucent(ior=1.0), translucent(roughness=0.3)):
         (method,) = light_methods(ready((point,), material))

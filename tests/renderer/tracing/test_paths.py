@@ -18,7 +18,6 @@ COLUMNS = (
         "triangle",
         "inside",
         "owner",
-        "scattered",
     ),
     *("lit", "branch", "surfaces"),
 )
@@ -35,7 +34,7 @@ def filled(capacity: int, count: int, translucent: int = 2) -> Paths:
     paths.branch[:] = number % 4
     paths.inside[:] = number % 5 + np.arange(max(translucent, 1))[:, None]
     paths.owner[:], paths.surfaces[:] = number % 3 - 1, number % 11
-    paths.scattered[:], paths.lit[:] = number % 2, number % 3 == 0
+    paths.lit[:] = number % 3 == 0
     return paths
 
 
@@ -51,7 +50,7 @@ def test_new_paths_start_outside_with_all_their_light():
     assert_array_equal(paths.inside, np.zeros((2, 3)))
     assert_array_equal(paths.owner, [OUTSIDE] * 3)
     assert paths.alive.all()
-    assert not (paths.scattered | paths.lit).any()
+    assert not paths.lit.any()
     assert_array_equal(paths.surfaces, [0, 0, 0])
 
 
