@@ -34,7 +34,7 @@ from .wavefront import Samples, Wavefront
 
 SHADER_ID = {"path": 0, "plumb": 1, "scalar": 2, "diffuse": 3}
 """In pictures; opaque objects and the background have -1."""
-_UNIT_SAMPLES = 2**18
+_UNIT_SAMPLES = 2**19
 """Camera samples of a work unit, at most. The last paths of a unit walk on in ever smaller company, up to a thousand
 steps in dense media, so units grow while they take less than ``_UNIT_SECONDS``; small pictures take many passes at
 once."""
