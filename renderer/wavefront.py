@@ -29,9 +29,9 @@ from .tracing.traced_scene import TracedScene
 
 Float32 = NDArray[np.float32]
 BLOCK = 131072
-"""Paths in flight of a worker. Many, although they do not fit into the second-level cache: between NumPy's calls threads
-wait for each other, and with 16 thousand a second thread brings nothing, with so many 1.5 to 1.9 times the speed
-(``benchmarks/walks.py``)."""
+"""Paths in flight of a worker. Many, although they do not fit into the second-level cache: between NumPy's calls
+threads wait for each other. With 16 thousand a second thread brings next to nothing, with these 1.5 to 1.9 times the
+speed (``benchmarks/walks.py``)."""
 
 _REFILL_AT = 1 / 2
 NOTHING = np.int16(-1)

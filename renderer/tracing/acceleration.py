@@ -21,8 +21,9 @@ time saved."""
 JUMP_ALBEDO, JUMP_INRADIUS = 0.97, 10.0
 """Least albedo and mean inradius (mean free paths) of bodies in which ball jumps pay."""
 GUIDE_ALBEDO, STRONG_GUIDE_ALBEDO, STRONG_GUIDE_SIZE = 0.995, 0.98, 16.0
-"""Guided flights save up to two thirds of the work at albedo 0.6, nothing at 0.998. Three of four flights are guided,
-and not two, where light that goes deep (bodies of many mean free paths) and comes back (albedo) does not matter."""
+"""Under a sky, guided flights save two thirds of the work at albedo 0.6 and nothing at 0.998. Three of four flights are
+guided, and not two, where no light that goes deep (bodies of many mean free paths) comes back (albedo), and where no
+lamp makes some of what comes out brighter than the rest."""
 
 
 @dataclass(frozen=True)
@@ -102,5 +103,6 @@ def _guide(scene: TracedScene, thing: TracedObject) -> Guide | None:
     if medium.g != 0 or not medium.is_achromatic or scene.lights.points or not 0 < albedo <= GUIDE_ALBEDO:
         return None
     size = float((thing.upper - thing.lower).max()) * sigma_t
-    strong = albedo < STRONG_GUIDE_ALBEDO and size >= STRONG_GUIDE_SIZE
+    lamps = scene.lights.rectangles or scene.lights.spheres
+    strong = albedo < STRONG_GUIDE_ALBEDO and size >= STRONG_GUIDE_SIZE and not lamps
     return Guide.of(albedo, sigma_t, 0.75 if strong else 0.5)
