@@ -14,8 +14,10 @@ from operator import itemgetter
 import numpy as np
 from numpy.typing import NDArray
 
+from .optics.multiple_importance import power_heuristic
 from .scene.beams import beams
 from .scene.camera import CameraRays
+from .scene.lights import RectangleSource, SphereSource
 from .shaders.boundary import meet_boundary, split
 from .shaders.fast_body import FastBody
 from .shaders.opaque import meet_diffuse, meet_mirror
@@ -159,10 +161,14 @@ class Wavefront:
             np.copyto(distance, reach, where=nearer)
             np.copyto(triangle, np.int32(-2 - k), where=nearer)
         escaped = np.flatnonzero(triangle == -1)
-        background = self.scene.lights.background(paths.direction[:, escaped])
+        lights = self.scene.lights
+        density = paths.density[escaped] if lights.skies else None
+        background = lights.background(paths.direction[:, escaped], density)
         self._radiance[:, paths.sample[escaped]] += paths.throughput[:, escaped] * background
         np.copyto(distance, 0, where=triangle == -1)
         paths.origin += paths.direction * distance
+        if lights.sampled:
+            paths.flown += distance
         paths.triangle[:] = triangle
         paths.remove(escaped)
         paths.move(np.arange(paths.count), self._standing)
@@ -226,8 +232,7 @@ class Wavefront:
         for k, rectangle in enumerate(scene.lights.rectangles):
             mine = index[(triangle - scene.first_light_triangle) // 2 == k]
             front = np.einsum("ij,ik->k", rectangle.normal, paths.direction[:, mine]) < 0
-            seen = mine[front & ~paths.lit[mine]]
-            self._radiance[:, paths.sample[seen]] += paths.throughput[:, seen] * rectangle.radiance
+            self._add_met(mine[front], rectangle)
         paths.alive[index] = False
 
     def _meet_spheres(self, index: NDArray[np.intp], which: NDArray[np.int32]) -> None:
@@ -235,6 +240,16 @@ class Wavefront:
         paths = self._standing
         self._note_first(index, np.full(len(index), NOTHING))
         for k, sphere in enumerate(self.scene.lights.spheres):
-            seen = index[(which == k) & ~paths.lit[index]]
-            self._radiance[:, paths.sample[seen]] += paths.throughput[:, seen] * sphere.radiance
+            self._add_met(index[which == k], sphere)
         paths.alive[index] = False
+
+    def _add_met(self, index: NDArray[np.intp], light: RectangleSource | SphereSource) -> None:
+        """Add the radiance of a light to the paths that have met it, as far as they were not connected to it before."""
+        paths = self._standing
+        share = np.ones(len(index), np.float32)
+        drawn = np.flatnonzero(np.isfinite(paths.density[index]))
+        if len(drawn):
+            who = index[drawn]
+            vertex = paths.origin[:, who] - paths.flown[who] * paths.direction[:, who]
+            share[drawn] = power_heuristic(paths.density[who], light.density(vertex))
+        self._radiance[:, paths.sample[index]] += paths.throughput[:, index] * light.radiance * share

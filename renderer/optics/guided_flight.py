@@ -80,6 +80,11 @@ class Guide:
         cosine = self.nu0 - (self.nu0 + 1) * np.exp(-self._log * u)
         return np.clip(cosine, -1, 1, out=cosine)
 
+    def density(self, cosine: Float32) -> Float32:
+        """(n,) density per steradian of directions with these cosines to the axis, guided and plain ones together."""
+        plain = np.float32((1 - self.share) / (4 * np.pi))
+        return plain + np.float32(self.share / (2 * np.pi * self._log)) / (np.float32(self.nu0) - cosine)
+
     def rate(self, cosine: Float32) -> Float32:
         """(n,) extinction of guided flights over that of plain ones."""
         return 1 - cosine * np.float32(1 / self.nu0)

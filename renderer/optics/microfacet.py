@@ -67,6 +67,20 @@ def scatter(view: Float32, to_light: Float32, eta, alpha: float) -> Float32:
     numerator: a path that starts and ends outside carries radiance over squared index, whose value no
     boundary changes but by 1 - F.
     """
+    density, share = turning(view, to_light, eta, alpha)
+    return density * share * unmasked(to_light[2], alpha)
+
+
+def turning(view: Float32, to_light: Float32, eta, alpha: float) -> tuple[Float32, Float32]:
+    """(n,) density per steradian of ``to_light`` when a facet that ``view`` sees is drawn and turns the path there, by
+    reflection if ``to_light`` is above the surface, else by refraction; (n,) share of that facet's light that it
+    reflects or refracts, F or 1 - F.
+
+        reflection    Dv / (4 v.h),   Dv = G1(v) D (v.h) / v.n
+        transmission  Dv eta_l^2 |l.h| / (eta_v v.h + eta_l l.h)^2
+
+    ``scatter`` is the product of both and G1(l). Heitz 2018, eq. 2 and 17; Walter et al. 2007, eq. 17.
+    """
     cos_view, cos_light = view[2], to_light[2]
     reflected = cos_light > 0
     half = np.where(reflected, view + to_light, -(view + eta * to_light))
@@ -77,8 +91,8 @@ def scatter(view: Float32, to_light: Float32, eta, alpha: float) -> Float32:
     # a facet must be seen from its own side by both
     possible = (view_half > 0) & (light_half * cos_light > 0) & (cos_view > 0)
     fresnel, _ = fresnel_reflectance(np.clip(view_half, 0, 1), eta)
-    common = facet_density(half[2], alpha) * unmasked(cos_view, alpha) * unmasked(cos_light, alpha)
-    common = common / np.maximum(cos_view, 1e-6)
+    seen = facet_density(half[2], alpha) * unmasked(cos_view, alpha) / np.maximum(cos_view, 1e-6)
     denominator = view_half + eta * light_half
-    transmitted = eta * eta * (1 - fresnel) * np.abs(view_half * light_half) / np.maximum(denominator**2, 1e-12)
-    return np.where(possible, common * np.where(reflected, fresnel / 4, transmitted), 0).astype(np.float32)
+    bent = eta * eta * np.abs(view_half * light_half) / np.maximum(denominator**2, 1e-12)
+    density = np.where(possible, seen * np.where(reflected, np.float32(0.25), bent), 0).astype(np.float32)
+    return density, np.where(reflected, fresnel, 1 - fresnel).astype(np.float32)

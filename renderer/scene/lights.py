@@ -14,9 +14,14 @@ from numpy.typing import NDArray
 
 from sss_tools.rays import UnitFrame
 
+from ..optics.multiple_importance import power_heuristic
 from .description import DirectionalLight, EnvironmentLight, Light, PointLight, RectangleLight, SphereLight
+from .sky_sampling import SkySampler
 
 Float32 = NDArray[np.float32]
+
+UNEVEN_SKY = 3.0
+"""Unevenness (``SkySampler``) from which on skies are sampled: a sky white above and black below has 2."""
 
 
 def _unit(vector) -> NDArray[np.float64]:
@@ -36,23 +41,31 @@ class Illumination:
     direction   (3, n) float32 unit vectors towards the light
     distance    (n,) float32 to the light, inf where it is infinitely far
     irradiance  (3, n) or (3, 1) float32 on a plane across the beam, unoccluded
+    density     (n,) float32 per steradian with which the direction was drawn; None of lights without extent
     ball        the shining ball that the light comes from, which does not shade itself
     """
 
     direction: Float32
     distance: Float32
     irradiance: Float32
+    density: Float32 | None = None
     ball: SphereSource | None = None
 
 
 class Environment:
-    """Radiance from infinitely far away."""
+    """Radiance from infinitely far away.
+
+    sampled  whether directions are worth drawing from where it is bright; else it is met by chance
+    """
 
     def __init__(self, light: EnvironmentLight):
         self.constant = None if light.radiance is None else column(light.radiance)
+        self.sampled = False
         if light.image is not None:
             self._image = np.ascontiguousarray(np.moveaxis(light.image, -1, 0), np.float32)
             self._turn = np.float32(light.rotation / 360)
+            self._sampler = SkySampler(self._image)
+            self.sampled = not self._sampler.dark and self._sampler.unevenness >= UNEVEN_SKY
 
     def radiance(self, direction: Float32) -> Float32:
         """(3, n) radiance seen along unit ``direction`` (3, n), (3, 1) where it is the same everywhere.
@@ -63,9 +76,7 @@ class Environment:
         if self.constant is not None:
             return self.constant
         _, height, width = self._image.shape
-        # counter-clockwise from above turns -z towards -x, against the growth of the columns
-        across = (np.arctan2(direction[0], -direction[2]) / np.float32(2 * np.pi) + np.float32(0.5) + self._turn) % 1
-        down = np.arccos(np.clip(direction[1], -1, 1)) / np.float32(np.pi)
+        across, down = self._place(direction)
         x, y = across * width - np.float32(0.5), np.clip(down * height - np.float32(0.5), 0, height - 1)
         left, top = np.floor(x).astype(np.int64), np.minimum(np.floor(y).astype(np.int64), height - 1)
         fx, fy = x - left, y - top
@@ -75,6 +86,26 @@ class Environment:
         upper = image[:, top, left] * (1 - fx) + image[:, top, right] * fx
         lower = image[:, bottom, left] * (1 - fx) + image[:, bottom, right] * fx
         return upper * (1 - fy) + lower * fy
+
+    def _place(self, direction: Float32) -> tuple[Float32, Float32]:
+        """(n,) shares of the way across and down the image."""
+        # counter-clockwise from above turns -z towards -x, against the growth of the columns
+        across = (np.arctan2(direction[0], -direction[2]) / np.float32(2 * np.pi) + np.float32(0.5) + self._turn) % 1
+        return across, np.arccos(np.clip(direction[1], -1, 1)) / np.float32(np.pi)
+
+    def density(self, direction: Float32) -> Float32:
+        """(n,) density per steradian with which ``sample`` draws the unit directions (3, n)."""
+        return self._sampler.density(*self._place(direction))
+
+    def sample(self, position: Float32, u1: Float32, u2: Float32) -> Illumination:
+        """Light from a random direction, as if all of it came from there."""
+        across, cosine, density = self._sampler.sample(u1, u2)
+        turn = np.float32(2 * np.pi) * (across - np.float32(0.5) - self._turn)
+        sine = np.sqrt(np.maximum(1 - cosine * cosine, 0))
+        direction = np.stack([sine * np.sin(turn), cosine, -sine * np.cos(turn)])
+        far = np.full(len(cosine), np.inf, np.float32)
+        irradiance = np.divide(self.radiance(direction), density, out=np.zeros_like(direction), where=density > 0)
+        return Illumination(direction, far, irradiance, density)
 
 
 class PointSource:
@@ -148,7 +179,18 @@ class RectangleSource:
         distance = np.sqrt(np.einsum("ij,ij->j", offset, offset))
         direction = (self._axes.T @ offset / np.maximum(distance, 1e-20)).astype(np.float32)
         arriving = np.where(local[2] > 0, solid_angle, 0).astype(np.float32)
-        return Illumination(direction, distance.astype(np.float32), self.radiance * arriving)
+        return Illumination(direction, distance.astype(np.float32), self.radiance * arriving, _inverse(arriving))
+
+    def density(self, position: Float32) -> Float32:
+        """(n,) density per steradian with which ``sample`` draws directions from ``position`` (3, n); 0 behind."""
+        local = self._axes @ (position - self._center)
+        solid_angle = spherical_rectangle(local, self._half, 0.5, 0.5)[1]
+        return _inverse(np.where(local[2] > 0, solid_angle, 0).astype(np.float32))
+
+
+def _inverse(solid_angle: Float32) -> Float32:
+    """One over it, 0 for 0."""
+    return np.divide(1, solid_angle, out=np.zeros_like(solid_angle), where=solid_angle > 0)
 
 
 def spherical_rectangle(viewer: NDArray[np.float64], half, u1, u2) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -212,16 +254,26 @@ class SphereSource:
         """Light from a random direction within the cone the ball fills, uniform in solid angle; none inside it."""
         from ..optics.phase import around, spherical
 
-        offset = self.center - position
-        distance = np.sqrt(np.einsum("ij,ij->j", offset, offset))
-        sine2 = np.minimum((self.radius / np.maximum(distance, self.radius)) ** 2, 1)
-        # 1 - cos without cancellation for small balls
-        spread = sine2 / (1 + np.sqrt(1 - sine2))
+        offset, distance, spread, solid_angle = self._cone(position)
         local = spherical(1 - u1 * spread, u2, np.empty_like(offset))
         direction = around(offset / np.maximum(distance, np.float32(1e-20)), local)
         reach = np.minimum(self.distance(position, direction), distance)
+        return Illumination(direction, reach, self.radiance * solid_angle, _inverse(solid_angle), self)
+
+    def density(self, position: Float32) -> Float32:
+        """(n,) density per steradian with which ``sample`` draws directions from ``position`` (3, n)."""
+        return _inverse(self._cone(position)[3])
+
+    def _cone(self, position: Float32) -> tuple[Float32, Float32, Float32, Float32]:
+        """To the centre from ``position`` (3, n): vector (3, n), distance, 1 - cosine of the cone that the ball
+        fills, and its solid angle, (n,) each."""
+        offset: Float32 = self.center - position
+        distance: Float32 = np.sqrt(np.einsum("ij,ij->j", offset, offset))
+        sine2 = np.minimum((self.radius / np.maximum(distance, self.radius)) ** 2, 1)
+        # 1 - cos without cancellation for small balls
+        spread = sine2 / (1 + np.sqrt(1 - sine2))
         solid_angle = np.where(distance > self.radius, np.float32(2 * np.pi) * spread, np.float32(0))
-        return Illumination(direction, reach, self.radiance * solid_angle, self)
+        return offset, distance, spread, solid_angle
 
 
 class LightSet:
@@ -242,11 +294,25 @@ class LightSet:
             elif isinstance(light, SphereLight):
                 self.spheres.append(SphereSource(light, frame))
 
-    def background(self, direction: Float32) -> Float32:
-        """(3, n) radiance that rays meet when they leave the scene along ``direction``."""
+        self.skies = [environment for environment in self.environments if environment.sampled]
+
+    @property
+    def sampled(self) -> bool:
+        """Whether there are lights that are found by drawing points on them as well as by chance."""
+        return bool(self.rectangles or self.spheres or self.skies)
+
+    def background(self, direction: Float32, density: Float32 | None = None) -> Float32:
+        """(3, n) radiance that rays meet when they leave the scene along ``direction``.
+
+        density  (n,) with which the directions were drawn where skies were sampled too, see ``Paths``: what is met is
+                 weighed for that; None where they were not
+        """
         total = np.zeros_like(direction)
         for environment in self.environments:
-            total += environment.radiance(direction)
+            seen = environment.radiance(direction)
+            if density is not None and environment.sampled:
+                seen = seen * power_heuristic(density, environment.density(direction))
+            total += seen
         return total
 
 

@@ -14,7 +14,7 @@ from ..tracing.traced_scene import TracedScene, offset_from
 from .crossings import Crossings
 from .local_frame import LocalFrame
 from .lost_paths import lose
-from .point_light import light_rough
+from .point_light import light_rough, turned_density
 
 Float32 = NDArray[np.float32]
 
@@ -65,6 +65,7 @@ def meet_boundary(
     roughness = np.array([thing.roughness for thing in scene.translucent], np.float32)[at.slot]
     rough = ~straight & (roughness > 0)
     turned, reflected = at.direction.copy(), np.zeros(len(at.index), bool)
+    density = np.where(straight, paths.density[at.index], np.float32(np.inf))
     smooth = np.flatnonzero(~straight & ~rough)
     if len(smooth):
         turned[:, smooth], reflected[smooth] = _turn(
@@ -74,18 +75,19 @@ def meet_boundary(
         mine = np.flatnonzero(rough & (at.slot == slot))
         if len(mine):
             u2, _ = uniforms.draw_at(paths.stream, at.index[mine])
-            turned[:, mine], reflected[mine] = _scatter_rough(
-                scene, paths, at.take(mine), thing.roughness, choice[mine], u1[mine], u2, tally, radiance
+            turned[:, mine], reflected[mine], density[mine] = _scatter_rough(
+                scene, paths, at.take(mine), thing.roughness, choice[mine], u1[mine], u2, uniforms, tally, radiance
             )
     # only now: both branches of a path must have met the same facet
     copies = at.index[paths.branch[at.index] == REFLECTS]
     paths.stream[copies] = branch_streams(paths.stream[copies])
     paths.branch[at.index[~straight]] = CHANCE
-    _keep_side(turned, at.near_normal, reflected)
+    density[_keep_side(turned, at.near_normal, reflected)] = np.inf
     crossed = at.index[~reflected]
     paths.inside[:, crossed] = at.inside_beyond[:, ~reflected]
     paths.owner[crossed] = at.beyond[~reflected]
-    paths.lit[at.index] &= straight
+    paths.density[at.index] = density
+    paths.flown[at.index[~straight]] = 0
     paths.direction[:, at.index] = turned
     side = np.where(reflected, np.float32(1), np.float32(-1))
     paths.origin[:, at.index] = offset_from(at.position, at.near_normal, side)
@@ -121,30 +123,40 @@ def _turn(
 
 
 def _scatter_rough(
-    scene, paths: Paths, at: Crossings, alpha: float, choice, u1, u2, tally: Tally, radiance: Float32
-) -> tuple[Float32, NDArray[np.bool_]]:
-    """GGX reflection or refraction, after light without extent was connected; weighs the throughputs.
+    scene: TracedScene, paths: Paths, at: Crossings, alpha: float, choice, u1, u2, uniforms: Uniforms, tally: Tally,
+    radiance: Float32,
+) -> tuple[Float32, NDArray[np.bool_], Float32]:  # fmt: skip
+    """GGX reflection or refraction, after lights were connected; weighs the throughputs.
+
+    Returns directions (3, n), whether they are reflected, and ``Paths.density``.
 
     With visible facets drawn, the weight of the scattered direction is its own masking G1 (Heitz 2018, eq. 19).
     """
     frame = LocalFrame(at.facing)
     view = frame.to_local(-at.direction)
-    if scene.lights.points:
+    if scene.lights.points or scene.lights.sampled:
         # of a path that was split, one branch speaks for both
         speaks = np.flatnonzero(paths.branch[at.index] != REFLECTS)
-        light_rough(scene, paths, at.take(speaks), frame.take(speaks), view[:, speaks], tally, radiance)
+        light_rough(scene, paths, at.take(speaks), frame.take(speaks), view[:, speaks], uniforms, tally, radiance)
     facet = sample_visible_facet(view, alpha, u1, u2)
     turned, reflected = _turn(-view, facet, at.eta, choice, paths, at.index)
     # single scattering: what ends on the wrong side would meet a second facet, and is lost
     valid = np.where(reflected, turned[2] > 0, turned[2] < 0)
     paths.throughput[:, at.index] *= np.where(valid, unmasked(turned[2], alpha), 0)
     paths.alive[at.index] &= valid
-    return frame.to_world(turned), reflected
+    density = np.full(len(at.index), np.inf, np.float32)
+    if scene.lights.sampled:
+        drawn, _ = turned_density(paths, at, view, turned, alpha)
+        # where lights were connected: on the side from which straight rays lead to them
+        straight = scene.media.ior[np.where(reflected, at.before, at.beyond)] == 1
+        np.copyto(density, drawn, where=straight & (drawn > 0))
+    return frame.to_world(turned), reflected, density
 
 
-def _keep_side(turned: Float32, near_normal: Float32, reflected: NDArray[np.bool_]) -> None:
-    """Mirror directions, in place, that a shading normal sent to the wrong side of the true surface."""
+def _keep_side(turned: Float32, near_normal: Float32, reflected: NDArray[np.bool_]) -> NDArray[np.intp]:
+    """Mirror directions, in place, that a shading normal sent to the wrong side of the true surface; which they are."""
     height = np.einsum("ij,ij->j", turned, near_normal)
     wrong = np.flatnonzero(np.where(reflected, height <= 0, height >= 0))
     if len(wrong):
         turned[:, wrong] -= 2 * height[wrong] * near_normal[:, wrong]
+    return wrong

@@ -2,15 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 from numpy.typing import NDArray
 
+from ..optics.multiple_importance import power_heuristic
 from ..scene.lights import Illumination
+from ..tracing.paths import Paths
 from ..tracing.shadow import transmittance
+from ..tracing.streams import Uniforms
 from ..tracing.tally import Tally
 from ..tracing.traced_scene import TracedScene, offset_from
 
 Float32 = NDArray[np.float32]
+
+FAINT = np.float32(0.02)
+"""Throughput times scattering function, per steradian, below which a sampled light is followed by chance: a quarter of
+what isotropic scattering has."""
 
 
 def received(
@@ -31,18 +40,48 @@ def received(
     return light.irradiance * transmittance(scene, scene.media, origin, light, inside, owner, tally)
 
 
-def arriving(scene: TracedScene, position: Float32, draw) -> list[Illumination]:
-    """One beam from each light but environments: all of a point light, a random part of an area light.
+def arriving(scene: TracedScene, position: Float32, draw, skies: bool = False) -> Iterator[Illumination]:
+    """One beam from each light: all of a point light, a random part of the others.
 
-    draw  called without arguments, returns two (n,) uniforms
+    draw   called without arguments, returns two (n,) uniforms
+    skies  whether environments that are worth it are sampled too
     """
-    lights = [source.illuminate(position) for source in scene.lights.points]
-    lights += [rectangle.sample(position, *draw()) for rectangle in scene.lights.rectangles]
-    lights += [sphere.sample(position, *draw()) for sphere in scene.lights.spheres]
-    return lights
+    lights = scene.lights
+    for source in lights.points:
+        yield source.illuminate(position)
+    for sampled in (*lights.rectangles, *lights.spheres, *(lights.skies if skies else ())):
+        yield sampled.sample(position, *draw())
 
 
 def pick(light: Illumination, columns: NDArray[np.intp]) -> Illumination:
     """The given columns of ``light``."""
     irradiance = light.irradiance if light.irradiance.shape[1] == 1 else light.irradiance[:, columns]
-    return Illumination(light.direction[:, columns], light.distance[columns], irradiance, light.ball)
+    density = None if light.density is None else light.density[columns]
+    return Illumination(light.direction[:, columns], light.distance[columns], irradiance, density, light.ball)
+
+
+def worthwhile(
+    paths: Paths,
+    index: NDArray[np.intp],
+    light: Illumination,
+    value: Float32,
+    drawn: Float32,
+    uniforms: Uniforms,
+) -> tuple[NDArray[np.intp], Float32]:
+    """Which connections of the paths ``index`` to ``light`` are followed, columns of it, and their weights.
+
+    value  (n,) scattering function times cosine, or phase function
+    drawn  (n,) density per steradian with which the paths themselves draw the direction to the light
+
+    Of a light with an extent, which paths may also meet, only a share counts; and little that it brings is followed
+    with a probability in proportion. Lights without extent are always followed.
+    """
+    if light.density is None:
+        columns = np.flatnonzero(value > 0)
+        return columns, value[columns]
+    columns = np.flatnonzero((value > 0) & (light.density > 0))
+    weight = value[columns] * power_heuristic(light.density[columns], drawn[columns])
+    chance = np.minimum(paths.throughput[:, index[columns]].max(axis=0) * weight / FAINT, 1)
+    u, _ = uniforms.draw_at(paths.stream, index[columns])
+    keep = np.flatnonzero(u < chance)
+    return columns[keep], weight[keep] / chance[keep]

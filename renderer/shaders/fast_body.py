@@ -14,14 +14,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..optics.dielectric import fresnel_reflectance
-from ..optics.microfacet import sample_visible_facet, scatter, unmasked
+from ..optics.microfacet import sample_visible_facet, turning, unmasked
 from ..scene.beams import Beam
 from ..tracing.paths import Paths
 from ..tracing.streams import Uniforms
 from ..tracing.tally import Tally
 from ..tracing.traced_scene import TracedObject, TracedScene, offset_from
 from . import plumb, scalar
-from .direct_light import pick, received
+from .direct_light import arriving, pick, received, worthwhile
 from .local_frame import LocalFrame
 from .surface import BodyOptics, SurfacePoints, outgoing_radiance
 
@@ -97,21 +97,22 @@ class FastBody:
         return np.einsum("ij,ji->j", scene.barycentric(position, triangle), corners)
 
     def _reflect_rough(self, scene, paths, index, position, normal, facing, eta, uniforms, tally, radiance) -> None:
-        """The reflecting half of the GGX boundary, with the highlights of lights without extent."""
+        """The reflecting half of the GGX boundary, with the highlights of lights."""
         alpha = self.thing.roughness
         frame = LocalFrame(normal)
         view = frame.to_local(-paths.direction[:, index])
         view[2] = np.maximum(view[2], np.float32(1e-4))
-        for source in scene.lights.points:
-            light = source.illuminate(position)
+        for light in arriving(scene, position, lambda: uniforms.draw_at(paths.stream, index), skies=True):
             to_light = frame.to_local(light.direction)
-            lit = np.flatnonzero((to_light[2] > 0) & (np.einsum("ij,ij->j", facing, light.direction) > 0))
+            drawn, share = turning(view, to_light, eta, alpha)
+            above = (to_light[2] > 0) & (np.einsum("ij,ij->j", facing, light.direction) > 0)
+            value = np.where(above, drawn * share * unmasked(to_light[2], alpha), 0)
+            lit, weight = worthwhile(paths, index, light, value, drawn, uniforms)
             if len(lit):
                 who = index[lit]
-                value = scatter(view[:, lit], to_light[:, lit], eta, alpha)
                 arrived = received(scene, position[:, lit], facing[:, lit], pick(light, lit),
                                    paths.inside[:, who], paths.owner[who], tally)  # fmt: skip
-                radiance[:, paths.sample[who]] += paths.throughput[:, who] * arrived * value
+                radiance[:, paths.sample[who]] += paths.throughput[:, who] * arrived * weight
         u1, u2 = uniforms.draw_at(paths.stream, index)
         facet = sample_visible_facet(view, alpha, u1, u2)
         cos_in = np.clip(np.einsum("ij,ij->j", view, facet), 0, 1)
@@ -120,10 +121,14 @@ class FastBody:
         weight = np.where(turned[2] > 0, reflectance * unmasked(turned[2], alpha), 0)
         paths.throughput[:, index] *= weight
         self._send_on(paths, index, position, facing, frame.to_world(turned))
+        if scene.lights.sampled:
+            drawn, _ = turning(view, turned, eta, alpha)
+            paths.density[index] = np.where(drawn > 0, drawn, np.inf)
+            paths.flown[index] = 0
 
     @staticmethod
     def _send_on(paths: Paths, index: NDArray[np.intp], position: Float32, facing: Float32, turned: Float32) -> None:
         paths.alive[index] &= np.einsum("ij,ij->j", turned, facing) > 0
         paths.direction[:, index] = turned
         paths.origin[:, index] = offset_from(position, facing, np.ones(len(index), np.float32))
-        paths.lit[index] = False
+        paths.density[index] = np.inf

@@ -10,7 +10,7 @@ from ..tracing.paths import CHANCE, Paths
 from ..tracing.streams import Uniforms
 from ..tracing.tally import Tally
 from ..tracing.traced_scene import TracedScene, offset_from
-from .direct_light import arriving, pick, received
+from .direct_light import arriving, pick, received, worthwhile
 
 Float32 = NDArray[np.float32]
 Indices = NDArray[np.intp]
@@ -32,8 +32,7 @@ def meet_diffuse(
 ) -> None:
     """Light the Lambertian points where the paths ``index`` are, and send the paths on by the cosine.
 
-    Area lights are sampled here, so the path must not count one that it meets next (``Paths.lit``);
-    environments are met by chance.
+    Lights with an extent are found both ways: sampled here, and met by the path that goes on. Even skies are only met.
     """
     geometric = np.take(scene.triangle_normal, triangle, axis=1)
     direction, position = paths.direction[:, index], paths.origin[:, index]
@@ -42,21 +41,29 @@ def meet_diffuse(
     shading = scene.shading_normal(position, triangle) * side
     reflectance = scene.reflectance[:, scene.triangle_object[triangle]]
     paths.throughput[:, index] *= reflectance
-    for light in arriving(scene, position, lambda: uniforms.draw_at(paths.stream, index)):
-        cosine = np.einsum("ij,ij->j", shading, light.direction)
-        lit = np.flatnonzero((cosine > 0) & (np.einsum("ij,ij->j", facing, light.direction) > 0))
+    for light in arriving(scene, position, lambda: uniforms.draw_at(paths.stream, index), skies=True):
+        value = _lambert(shading, facing, light.direction)
+        lit, weight = worthwhile(paths, index, light, value, value, uniforms)
         if len(lit):
             who = index[lit]
             arrived = received(scene, position[:, lit], facing[:, lit], pick(light, lit),
                                paths.inside[:, who], paths.owner[who], tally)  # fmt: skip
-            radiance[:, paths.sample[who]] += paths.throughput[:, who] * arrived * (cosine[lit] / np.float32(np.pi))
+            radiance[:, paths.sample[who]] += paths.throughput[:, who] * arrived * weight
     u1, u2 = uniforms.draw_at(paths.stream, index)
     turned = cosine_direction(shading, u1, u2)
     paths.alive[index] &= np.einsum("ij,ij->j", turned, facing) > 0
     paths.direction[:, index] = turned
     paths.origin[:, index] = offset_from(position, facing, np.ones_like(side))
-    paths.lit[index] = True
+    if scene.lights.sampled:
+        paths.density[index], paths.flown[index] = _lambert(shading, facing, turned), 0
     paths.branch[index] = CHANCE
+
+
+def _lambert(shading: Float32, facing: Float32, direction: Float32) -> Float32:
+    """(n,) cosine over pi, which is scattering function times cosine and density of the directions drawn, for white."""
+    cosine = np.einsum("ij,ij->j", shading, direction)
+    above = (cosine > 0) & (np.einsum("ij,ij->j", facing, direction) > 0)
+    return np.where(above, cosine * np.float32(1 / np.pi), 0)
 
 
 def meet_mirror(scene: TracedScene, paths: Paths, index: Indices, triangle: NDArray[np.int32]) -> None:
@@ -71,7 +78,7 @@ def meet_mirror(scene: TracedScene, paths: Paths, index: Indices, triangle: NDAr
     paths.throughput[:, index] *= scene.reflectance[:, scene.triangle_object[triangle]]
     paths.direction[:, index] = turned
     paths.origin[:, index] = offset_from(position, geometric, side)
-    paths.lit[index] = False
+    paths.density[index] = np.inf
 
 
 def patch_radiance(scene: TracedScene, position: Float32, facing: Float32, draw) -> Float32:

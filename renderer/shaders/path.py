@@ -22,7 +22,7 @@ from ..optics.free_flight import (
     surface_weight,
 )
 from ..optics.guided_flight import Guide
-from ..optics.phase import around, sample_henyey_greenstein, spherical
+from ..optics.phase import around, henyey_greenstein, sample_henyey_greenstein, spherical
 from ..tracing.acceleration import Acceleration
 from ..tracing.distance_grid import Scratch
 from ..tracing.paths import CHANCE, Paths
@@ -62,10 +62,13 @@ class MediumWalk:
         self._albedo = media.albedo[:, slot, None]
         self._achromatic = bool((self._sigma_t == self._sigma_t[0]).all())
         self._g = media.g[slot]
-        lit = media.ior[slot] == 1 or scene.holds_light[:, slot].any()
-        self._lit_inside = bool(scene.lights.points) and bool(lit)
+        straight = media.ior[slot] == 1
+        self._chance_shares = scene.lights.sampled
+        self._lit_by_areas = bool(straight) and scene.lights.sampled
+        self._lit_inside = self._lit_by_areas or bool(scene.lights.points and straight)
+        self._lit_inside |= bool(scene.holds_light[:, slot].any())
         self._lit_through_facets = any(np.float32(beams.ior) == media.ior[slot] for beams in scene.beams)
-        if self._lit_through_facets:
+        if self._lit_through_facets or self._lit_inside:
             # the collisions that a jump leaves out would not be connected
             self._jumps = None
         thing = scene.translucent[slot]
@@ -94,6 +97,8 @@ class MediumWalk:
                 turned = around(paths.direction, turned)
         else:
             turned, weigh = self._turn_guided(self._guide, u_cosine, u_turn, flight)
+        if self._lit_by_areas:
+            np.copyto(paths.density, self._density(slice(None), turned), where=~paths.flies_on)
         np.copyto(paths.direction, turned, where=~paths.flies_on)
         if self._achromatic:
             arrived, triangle = self._fly_achromatic(flight, bound)
@@ -102,12 +107,15 @@ class MediumWalk:
         if weigh is not None:
             paths.throughput *= weigh(flight, arrived)
         paths.triangle[arrived] = triangle
+        if self._chance_shares:
+            paths.flown[arrived] += flight[arrived]
         paths.move(arrived, standing)
         if self._achromatic:
             # the flight's density cancels extinction; what is left at a collision is the albedo
             paths.throughput *= self._albedo
         paths.flies_on[:] = False
-        paths.lit[:] = False
+        if self._chance_shares:
+            paths.density[:], paths.flown[:] = np.inf, 0
         paths.surfaces[:] = 0
         paths.branch[:] = CHANCE
         self._lose_leaked(radiance)
@@ -118,12 +126,20 @@ class MediumWalk:
         collided = ~paths.flies_on
         self.tally.collisions += int(np.count_nonzero(collided))
         if self._lit_inside:
-            light_collisions(self.scene, paths, collided.nonzero()[0], self.slot, self.tally, radiance)
+            index = collided.nonzero()[0]
+            light_collisions(self.scene, paths, index, self.slot, self._density, self._uniforms, self.tally, radiance)
         if self._lit_through_facets:
             index = collided.nonzero()[0]
             light_through_facets(self.scene, paths, index, self.slot, self._uniforms, self.tally, radiance)
         play_at_collisions(paths, self._uniforms)
         paths.bury()
+
+    def _density(self, index: NDArray[np.intp] | slice, direction: Float32) -> Float32:
+        """(m,) density per steradian with which collisions turn the paths ``index`` to ``direction`` (3, m)."""
+        if self._guide is None:
+            before = self.paths.direction[:, index]
+            return henyey_greenstein(np.einsum("ij,ij->j", before, direction), self._g)
+        return self._guide.density(np.einsum("ij,ij->j", self.paths.axis[:, index], direction))
 
     def _reach(self, position: Float32) -> Float32 | None:
         """(n,) how far around the positions (3, n) there is no surface for sure; None where nothing is known."""

@@ -1,68 +1,99 @@
-"""Light without extent, which no path can meet by chance: points and parallel beams.
+"""Lights connected to where paths scatter: next-event estimation.
 
-Where the boundary is invisible it is connected to collisions, at rough boundaries to the boundary, both without
-bias. Behind smooth boundaries it is connected through their facets, see ``refracted_light``.
+Where the boundary is invisible they are connected to collisions, at rough boundaries to the boundary, both without
+bias. Lights without extent, points and parallel beams, no path can meet by chance. The others are found both ways,
+and share (``direct_light.worthwhile``). Behind smooth boundaries lights without extent are connected through the
+facets, see ``refracted_light``, and the others met by chance.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import NDArray
 
-from ..optics.microfacet import scatter
+from ..optics.microfacet import turning, unmasked
 from ..optics.phase import henyey_greenstein
-from ..tracing.paths import Paths
+from ..tracing.paths import REFLECTS, REFRACTS, Paths
 from ..tracing.shadow import transmittance as shadow_transmittance
+from ..tracing.streams import Uniforms
 from ..tracing.tally import Tally
 from ..tracing.traced_scene import TracedScene
 from .crossings import Crossings
-from .direct_light import pick, received
+from .direct_light import arriving, pick, received, worthwhile
 from .local_frame import LocalFrame
 
 Float32 = NDArray[np.float32]
 
 
 def light_collisions(
-    scene: TracedScene, paths: Paths, index: NDArray[np.intp], slot: int, tally: Tally, radiance: Float32
+    scene: TracedScene,
+    paths: Paths,
+    index: NDArray[np.intp],
+    slot: int,
+    drawn: Callable[[NDArray[np.intp], Float32], Float32],
+    uniforms: Uniforms,
+    tally: Tally,
+    radiance: Float32,
 ) -> None:
     """Light the collisions of the paths ``index`` in the medium ``slot``, from where light comes straight on.
 
         w p(mu) E0 exp(-optical depth) / ior^2, w with this collision's albedo
 
-    That is through invisible boundaries, or from a light in the same medium.
+    That is through invisible boundaries, or from a light without extent in the same medium.
     ``paths.direction`` must still be the one before the collision.
+
+    drawn  density with which the paths of the given columns draw the directions (3, m)
     """
     if not len(index):
         return
     media = scene.media
-    position, direction, sample = paths.origin[:, index], paths.direction[:, index], paths.sample[index]
+    position = paths.origin[:, index]
     ior = float(media.ior[slot])
-    for number, source in enumerate(scene.lights.points):
-        if ior != 1 and not scene.holds_light[number, slot]:
+    if ior == 1:
+        lights = arriving(scene, position, lambda: uniforms.draw_at(paths.stream, index), skies=True)
+    else:
+        held = zip(scene.lights.points, scene.holds_light[:, slot], strict=True)
+        lights = (source.illuminate(position) for source, holds in held if holds)
+    for light in lights:
+        phase = henyey_greenstein(np.einsum("ij,ij->j", paths.direction[:, index], light.direction), media.g[slot])
+        some, weight = worthwhile(paths, index, light, phase, drawn(index, light.direction), uniforms)
+        if not len(some):
             continue
-        light = source.illuminate(position)
-        phase = henyey_greenstein(np.einsum("ij,ij->j", direction, light.direction), media.g[slot])
-        visible = shadow_transmittance(scene, media, position, light, paths.inside[:, index], paths.owner[index], tally)
-        radiance[:, sample] += paths.throughput[:, index] * light.irradiance * (phase * visible / (ior * ior))
+        who, light = index[some], pick(light, some)
+        visible = shadow_transmittance(
+            scene, media, position[:, some], light, paths.inside[:, who], paths.owner[who], tally
+        )
+        arrived = light.irradiance * (weight * visible / (ior * ior))
+        radiance[:, paths.sample[who]] += paths.throughput[:, who] * arrived
 
 
 def light_rough(
-    scene: TracedScene, paths: Paths, at: Crossings, frame: LocalFrame, view: Float32, tally: Tally, radiance: Float32
+    scene: TracedScene,
+    paths: Paths,
+    at: Crossings,
+    frame: LocalFrame,
+    view: Float32,
+    uniforms: Uniforms,
+    tally: Tally,
+    radiance: Float32,
 ) -> None:
     """Light rough boundary points by reflection or transmission, whichever side the light is on.
 
     frame, view  axes around the shading normal on the viewer's side, and the direction back along the path in them
     """
     alpha = scene.translucent[int(at.slot[0])].roughness
-    for source in scene.lights.points:
-        light = source.illuminate(at.position)
+    for light in arriving(scene, at.position, lambda: uniforms.draw_at(paths.stream, at.index), skies=True):
         to_light = frame.to_local(light.direction)
-        value = scatter(view, to_light, at.eta, alpha)
+        drawn, share = turned_density(paths, at, view, to_light, alpha)
+        value = drawn * share * unmasked(to_light[2], alpha)
         height = np.einsum("ij,ij->j", at.near_normal, light.direction)
         same_side = height > 0
         owner = np.where(same_side, at.before, at.beyond)
         # straight rays lead to the light from where the index is 1; shading and true normal must agree on the side
-        useful = np.flatnonzero((value > 0) & (scene.media.ior[owner] == 1) & (height * to_light[2] > 0))
+        value[(scene.media.ior[owner] != 1) | (height * to_light[2] <= 0)] = 0
+        useful, weight = worthwhile(paths, at.index, light, value, drawn, uniforms)
         if len(useful):
             some = at.take(useful)
             side = np.where(same_side[useful], np.float32(1), np.float32(-1))
@@ -70,4 +101,15 @@ def light_rough(
             arrived = received(
                 scene, some.position, some.near_normal * side, pick(light, useful), inside, owner[useful], tally
             )
-            radiance[:, paths.sample[some.index]] += paths.throughput[:, some.index] * arrived * value[useful]
+            radiance[:, paths.sample[some.index]] += paths.throughput[:, some.index] * arrived * weight
+
+
+def turned_density(
+    paths: Paths, at: Crossings, view: Float32, turned: Float32, alpha: float
+) -> tuple[Float32, Float32]:
+    """(n,) density with which the paths at a rough boundary are turned to the local directions ``turned`` (3, n), and
+    (n,) the share of light by which they are weighed there: chance has taken it from all but split paths."""
+    density, share = turning(view, turned, at.eta, alpha)
+    branch = paths.branch[at.index]
+    split = (branch == REFLECTS) | (branch == REFRACTS)
+    return np.where(split, density, density * share), np.where(split, share, np.float32(1))

@@ -64,6 +64,8 @@ def _jumps_pay(scene: TracedScene, thing: TracedObject) -> bool:
     assert medium is not None
     if medium.g != 0 or not medium.is_achromatic or scene.lights.points or scene.lights.spheres:
         return False
+    if medium.ior == 1 and scene.lights.sampled:
+        return False
     mesh = scene.scene.objects[thing.index].mesh
     inradius = 3 * abs(mesh.volume) / max(mesh.area, 1e-300) / scene.frame.scale
     return bool(medium.single_scattering_albedo.max() >= JUMP_ALBEDO and inradius * medium.sigma_t[0] >= JUMP_INRADIUS)

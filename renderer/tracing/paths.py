@@ -28,8 +28,9 @@ class Paths:
     triangle    (n,) int32 where the path stands, for paths on surfaces
     inside      (k, n) int8 how many times inside each of the k translucent objects: entered minus left
     owner       (n,) int16 which of the k owns the medium here (the first that the path is inside of), -1 outside
-    lit         (n,) bool, whether area lights were already sampled from the last vertex, so that meeting one
-                now must not count again
+    density     (n,) float32 per steradian with which the direction was drawn at the last vertex, where lights were
+                sampled there too, so that meeting one now counts in part; inf where they were not
+    flown       (n,) float32 distance from there, as far as ``density`` is finite
     flies_on    (n,) bool, in media: whether the direction is that of the next flight, and not that before a collision
     branch      (n,) int8 what the path does at the next boundary, see ``WHOLE``
     surfaces    (n,) int16 surfaces met since the last collision
@@ -49,7 +50,8 @@ class Paths:
             "triangle": np.empty(capacity, np.int32),
             "inside": np.empty((max(translucent_objects, 1), capacity), np.int8),
             "owner": np.empty(capacity, np.int16),
-            "lit": np.empty(capacity, bool),
+            "density": np.empty(capacity, np.float32),
+            "flown": np.empty(capacity, np.float32),
             "flies_on": np.empty(capacity, bool),
             "branch": np.empty(capacity, np.int8),
             "surfaces": np.empty(capacity, np.int16),
@@ -70,7 +72,7 @@ class Paths:
         )
         self.faint, self.stream, self.sample = store["faint"], store["stream"], store["sample"]
         self.triangle, self.inside, self.owner = store["triangle"], store["inside"], store["owner"]
-        self.lit, self.branch = store["lit"], store["branch"]
+        self.density, self.flown, self.branch = store["density"], store["flown"], store["branch"]
         self.flies_on, self.surfaces, self.alive = store["flies_on"], store["surfaces"], store["alive"]
 
     @property
@@ -93,7 +95,8 @@ class Paths:
         store["faint"][new] = ROULETTE_BELOW
         store["inside"][:, new] = 0
         store["owner"][new] = OUTSIDE
-        store["lit"][new] = store["flies_on"][new] = False
+        store["density"][new], store["flown"][new] = np.inf, 0
+        store["flies_on"][new] = False
         store["branch"][new] = WHOLE
         store["surfaces"][new] = 0
         store["alive"][new] = True

@@ -19,7 +19,7 @@ COLUMNS = (
         "inside",
         "owner",
     ),
-    *("lit", "branch", "surfaces"),
+    *("density", "flown", "branch", "surfaces"),
 )
 
 
@@ -34,7 +34,7 @@ def filled(capacity: int, count: int, translucent: int = 2) -> Paths:
     paths.branch[:] = number % 4
     paths.inside[:] = number % 5 + np.arange(max(translucent, 1))[:, None]
     paths.owner[:], paths.surfaces[:] = number % 3 - 1, number % 11
-    paths.lit[:] = number % 3 == 0
+    paths.density[:], paths.flown[:] = number / 5, number / 9
     return paths
 
 
@@ -50,7 +50,8 @@ def test_new_paths_start_outside_with_all_their_light():
     assert_array_equal(paths.inside, np.zeros((2, 3)))
     assert_array_equal(paths.owner, [OUTSIDE] * 3)
     assert paths.alive.all()
-    assert not paths.lit.any()
+    assert np.isinf(paths.density).all()
+    assert not paths.flown.any()
     assert_array_equal(paths.surfaces, [0, 0, 0])
 
 
