@@ -18,7 +18,7 @@ from .output import image, passes
 from .output.film import Film
 from .output.image import Picture
 from .render import Renderer
-from .scene.description import DirectionalLight, PointLight, SceneObject, Translucent
+from .scene.description import DirectionalLight, PointLight, RectangleLight, SceneObject, SphereLight, Translucent
 
 DEFAULT_PASSES = 64
 CHECKPOINT_EVERY = 1.0
@@ -180,20 +180,31 @@ def report(renderer: Renderer, picture: Picture, version: str, total: float) -> 
 
 
 def light_methods(renderer: Renderer) -> list[dict[str, str]]:
-    """How lights without extent get into media, and the known bias, for each object lit by the path shader."""
-    if not any(isinstance(light, PointLight | DirectionalLight) for light in renderer.scene.lights):
-        return []
+    """How lights get into media, and the known bias, for each object lit by the path shader: lights without extent, and
+    lights that are found both by sampling them and by chance. Even skies are met by chance, without bias."""
+    kinds = {type(light) for light in renderer.scene.lights}
+    sampled = [name for kind, name in ((RectangleLight, "rectangles"), (SphereLight, "balls")) if kind in kinds]
+    if renderer.traced.lights.skies:
+        sampled.append("uneven skies")
     methods = []
     for thing, plan in zip(renderer.scene.objects, renderer.plans, strict=True):
         if plan.shader != "path" or not isinstance(thing.material, Translucent):
             continue
         if thing.material.medium.ior == 1:
-            method, bias = "next-event estimation at collisions", "none"
+            where = "at collisions"
         elif thing.material.roughness > 0:
-            method, bias = "next-event estimation through the rough boundary", "none"
+            where = "through the rough boundary"
         else:
-            method, bias = _through_facets(renderer, thing)
-        methods.append({"object": thing.name, "method": method, "known_bias": bias})
+            where = ""
+        if kinds & {PointLight, DirectionalLight}:
+            if where:
+                method, bias = f"next-event estimation {where}", "none"
+            else:
+                method, bias = _through_facets(renderer, thing)
+            methods.append({"object": thing.name, "lights": "without extent", "method": method, "known_bias": bias})
+        if sampled:
+            method = f"next-event estimation {where} and chance, weighed" if where else "chance"
+            methods.append({"object": thing.name, "lights": ", ".join(sampled), "method": method, "known_bias": "none"})
     return methods
 
 

@@ -264,11 +264,11 @@ class SphereSource:
         """(n,) density per steradian with which ``sample`` draws directions from ``position`` (3, n)."""
         return _inverse(self._cone(position)[3])
 
-    def _cone(self, position: Float32) -> tuple[Float32, Float32, Float32, Float32]:
+    def _cone(self, position: Float32) -> tuple[NDArray, NDArray, NDArray, NDArray]:
         """To the centre from ``position`` (3, n): vector (3, n), distance, 1 - cosine of the cone that the ball
         fills, and its solid angle, (n,) each."""
-        offset: Float32 = self.center - position
-        distance: Float32 = np.sqrt(np.einsum("ij,ij->j", offset, offset))
+        offset = self.center - position
+        distance = np.sqrt(np.einsum("ij,ij->j", offset, offset))
         sine2 = np.minimum((self.radius / np.maximum(distance, self.radius)) ** 2, 1)
         # 1 - cos without cancellation for small balls
         spread = sine2 / (1 + np.sqrt(1 - sine2))

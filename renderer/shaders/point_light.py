@@ -13,9 +13,11 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
+from ..optics.free_flight import exponential
 from ..optics.microfacet import turning, unmasked
 from ..optics.phase import henyey_greenstein
 from ..tracing.paths import REFLECTS, REFRACTS, Paths
+from ..tracing.shadow import FREE_DEPTH
 from ..tracing.shadow import transmittance as shadow_transmittance
 from ..tracing.streams import Uniforms
 from ..tracing.tally import Tally
@@ -62,8 +64,10 @@ def light_collisions(
         if not len(some):
             continue
         who, light = index[some], pick(light, some)
+        u, _ = uniforms.draw_at(paths.stream, who)
+        deepest = FREE_DEPTH + exponential(u, np.empty_like(u))
         visible = shadow_transmittance(
-            scene, media, position[:, some], light, paths.inside[:, who], paths.owner[who], tally
+            scene, media, position[:, some], light, paths.inside[:, who], paths.owner[who], tally, deepest
         )
         arrived = light.irradiance * (weight * visible / (ior * ior))
         radiance[:, paths.sample[who]] += paths.throughput[:, who] * arrived

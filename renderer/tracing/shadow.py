@@ -16,6 +16,9 @@ Float32 = NDArray[np.float32]
 _SHORT_OF_LIGHT = np.float32(1 - 1e-5)
 """Shadow rays end before the light's own geometry: a relative part, and some offsets of the ray's start."""
 
+FREE_DEPTH = np.float32(1)
+"""Optical depth up to which light is always followed."""
+
 
 def transmittance(
     scene: TracedScene,
@@ -25,14 +28,19 @@ def transmittance(
     inside: NDArray[np.int8],
     owner: NDArray[np.int16],
     tally: Tally,
+    deepest: Float32 | None = None,
 ) -> Float32:
     """(3, n) share of the light's beam that reaches ``position`` without being bent, scattered or absorbed.
 
     Surfaces between media of one index let the beam pass, and the medium behind them attenuates it; every other
     surface, light sources included, blocks it. ``position`` must already be offset off its surface; ``inside`` (k, n)
     and ``owner`` (n,) say where it is (see ``Paths``).
+
+    deepest  (n,) optical depth of the first medium, in its clearest channel, at which light is given up, so that rays
+             stay short: ``FREE_DEPTH`` plus an exponential variate. Light from deeper then stands for all that would be
+             given up, and the mean is the same
     """
-    return follow(scene, media, position, light, inside, owner, tally)[0]
+    return follow(scene, media, position, light, inside, owner, tally, deepest)[0]
 
 
 def follow(
@@ -43,8 +51,10 @@ def follow(
     inside: NDArray[np.int8],
     owner: NDArray[np.int16],
     tally: Tally,
+    deepest: Float32 | None = None,
 ) -> tuple[Float32, NDArray[np.int8], NDArray[np.int16]]:
     """``transmittance``, and ``inside`` and ``owner`` at the light's end, which mean nothing where it is 0."""
+    limit = None if deepest is None else _limit(media, owner, deepest)
     n = position.shape[1]
     result = np.zeros((3, n), np.float32)
     inside_there, owner_there = np.zeros((inside.shape[0], n), np.int8), np.zeros(n, np.int16)
@@ -62,8 +72,11 @@ def follow(
             active = active[visible[active]]
     origin, direction, remaining = origin[:, active], direction[:, active], remaining[active]
     depth, inside, owner = depth[:, active], inside[:, active], owner[active]
+    if limit is not None:
+        limit = limit[active]
     while len(active):
-        distance, triangle = scene.closest(origin, direction, remaining)
+        reaches = remaining if limit is None else np.minimum(remaining, limit)
+        distance, triangle = scene.closest(origin, direction, reaches)
         tally.rays += len(active)
         hit = triangle >= 0
         # a ray that ends inside an object without having met its surface leaked; attenuation takes it away
@@ -71,6 +84,11 @@ def follow(
         extinction = media.of(media.sigma_t, owner)
         depth += extinction * reach
         done = ~hit
+        if limit is not None:
+            # chance has taken most of the depth beyond what is free
+            depth -= np.maximum(extinction.min(axis=0) * reach - FREE_DEPTH, 0)
+            done &= remaining <= limit
+            limit = None
         there = active[done]
         result[:, there] = np.exp(-depth[:, done] - extinction[:, done] * short[there])
         inside_there[:, there], owner_there[there] = inside[:, done], owner[done]
@@ -91,6 +109,13 @@ def follow(
         origin = offset_from(landing, normal[:, straight], cosine[straight])
         remaining = np.where(remaining[keep] < MISS, np.maximum(remaining[keep] - distance, 0), MISS)
     return result, inside_there, owner_there
+
+
+def _limit(media: MediaTable, owner: NDArray[np.int16], deepest: Float32) -> Float32:
+    """(n,) distance in the first medium at which light is given up."""
+    extinction = media.of(media.sigma_t, owner).min(axis=0)
+    limit = np.full(len(owner), MISS)
+    return np.divide(deepest, extinction, out=limit, where=extinction > 1 / MISS)
 
 
 def cross(inside: NDArray[np.int8], slot: NDArray[np.intp], entering: NDArray[np.bool_]) -> NDArray[np.int16]:

@@ -12,7 +12,7 @@ from renderer import job
 from renderer.job import Budget, checkpoint_path, execute, guide_arrays, light_methods, merged, report
 from renderer.output import image
 from renderer.render import Renderer, Settings
-from renderer.scene.description import DirectionalLight, PointLight
+from renderer.scene.description import DirectionalLight, EnvironmentLight, PointLight, RectangleLight
 from sss_tools import shapes
 from sss_tools.errors import InputError
 from tests.renderer.scenes import WHITE_SKY, camera, diffuse, placed, scene, translucent
@@ -170,6 +170,19 @@ def test_the_bias_of_lights_without_extent_is_named_where_there_is_one():
     for material in (translucent(ior=1.0), translucent(roughness=0.3)):
         (method,) = light_methods(ready((point,), material))
         assert method["known_bias"] == "none"
+
+
+def test_lights_with_an_extent_are_sampled_where_the_boundary_lets_them_through():
+    lamp = RectangleLight(np.array([0.0, 3, 0]), np.zeros(3), np.array([1.0, 0, 0]), (1, 1), np.ones(3))
+    sun = np.zeros((8, 16, 3), np.float32)
+    sun[2, 3] = 1
+    for material, said in ((translucent(ior=1.0), "at collisions and chance"), (translucent(), "chance"),
+                           (translucent(roughness=0.3), "rough boundary and chance")):  # fmt: skip
+        (method,) = light_methods(ready((lamp, EnvironmentLight(image=sun)), material))
+        assert method["lights"] == "rectangles, uneven skies" and said in method["method"]
+        assert ("next-event" in method["method"]) == (said != "chance")
+        assert method["known_bias"] == "none"
+    assert [entry["lights"] for entry in light_methods(ready((lamp, SUN)))] == ["without extent", "rectangles"]
 
 
 def test_guides_are_in_scene_units_and_outward():

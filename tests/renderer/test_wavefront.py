@@ -38,6 +38,7 @@ def vector(*coordinates) -> np.ndarray:
 def everything(sigma_t):
     """One of each: boundaries smooth, rough and matched, flat and interpolated normals, floor, mirror, all lights."""
     image = np.random.default_rng(1).random((8, 16, 3)).astype(np.float32)
+    image[2, 5] = 30  # bright enough to be sampled
     objects = [
         placed(moved(icosphere(0.5, 3), (-0.6, 0.5, 0)), translucent([0.9, 0.8, 0.7], sigma_t, 0.3, 1.5)),
         # reaches into the next: its surface there is not a boundary

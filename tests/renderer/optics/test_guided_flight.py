@@ -85,3 +85,10 @@ def test_no_weight_exceeds_that_of_plain_flights_alone():
     weight, *_ = walks(GUIDE, 10.0, 3)
     assert weight.max() <= 1 / (1 - GUIDE.share) * (1 + 1e-6)
     assert np.isfinite(weight).all()
+
+
+def test_directions_of_guided_and_plain_flights_together_have_the_stated_density():
+    plain = (1 - GUIDE.share) / (4 * np.pi)
+    for cosine in (-1.0, -0.2, 0.9, 1.0):
+        expected = plain + GUIDE.share * density(cosine) / (2 * np.pi)
+        assert GUIDE.density(np.float32([cosine]))[0] == pytest.approx(expected, rel=1e-5)

@@ -236,3 +236,19 @@ def test_fibonacci_directions_are_unit_and_even():
     assert_allclose(np.linalg.norm(directions, axis=0), 1, atol=1e-6)
     assert_allclose(directions.mean(axis=1), 0, atol=2e-3)
     assert_allclose(directions @ directions.T / 1000, np.eye(3) / 3, atol=2e-3)
+
+
+@pytest.mark.parametrize("position", [(0, 0, 0), (0.4, -0.7, 0.2), (0, 0, -50), (3, 0, 0)])
+def test_density_is_that_with_which_directions_are_drawn(position):
+    """One over the solid angle, and 0 from where there is no light."""
+    rectangle = RectangleLight(vector(0, 0, 1), vector(0, 0, 0), vector(1, 0, 0), (0.5, 0.3), np.ones(3))
+    for source in (
+        RectangleSource(rectangle, HERE),
+        SphereSource(SphereLight(vector(0, 0, 1), 0.4, np.ones(3)), HERE),
+    ):
+        at = column(*position).astype(np.float32)
+        beam = source.sample(at, np.float32([0.3]), np.float32([0.8]))
+        assert_allclose(source.density(at), beam.density, rtol=1e-5)
+        assert_allclose(beam.irradiance[0] * beam.density, beam.irradiance[0] > 0, rtol=1e-5)
+    behind = column(0, 0, 2).astype(np.float32)
+    assert RectangleSource(rectangle, HERE).density(behind)[0] == 0

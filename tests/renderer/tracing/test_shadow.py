@@ -7,7 +7,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from renderer.scene.description import PointLight, RectangleLight, SphereLight
 from renderer.scene.lights import Illumination
 from renderer.tracing.paths import OUTSIDE
-from renderer.tracing.shadow import cross, transmittance
+from renderer.tracing.shadow import FREE_DEPTH, cross, transmittance
 from renderer.tracing.tally import Tally
 from renderer.tracing.traced_scene import TracedScene
 from sss_tools.shapes import box, hollow_ball, icosphere, moved
@@ -21,7 +21,7 @@ def traced(*objects, lights=(WHITE_SKY,), shaders=None) -> TracedScene:
     return TracedScene(scene(objects, lights, camera((0, 0, 5))), shaders, ["strict"] * len(objects))
 
 
-def through(world: TracedScene, start, end, inside=None):
+def through(world: TracedScene, start, end, inside=None, deepest=None):
     """(3,) transmittance between two points in scene units; ``inside`` how often inside each object at the start."""
     start, end = (world.frame.points_in(point).astype(np.float32).reshape(3, 1) for point in (start, end))
     distance = np.linalg.norm(end - start, axis=0).astype(np.float32)
@@ -31,7 +31,7 @@ def through(world: TracedScene, start, end, inside=None):
         counts[:, 0] = inside
     within = counts[:, 0] > 0
     owner = np.int16([within.argmax() if within.any() else OUTSIDE])
-    return transmittance(world, world.media, start, light, counts, owner, Tally())[:, 0]
+    return transmittance(world, world.media, start, light, counts, owner, Tally(), deepest)[:, 0]
 
 
 def attenuation(length: float):
@@ -172,3 +172,18 @@ def test_counts_and_owners_follow_the_crossings():
     owner = cross(inside, np.array([1, 0, 0, 1]), np.array([True, False, False, True]))
     assert_array_equal(inside, [[0, 0, 0, 0], [1, 0, 1, 2]])
     assert_array_equal(owner, [1, -1, 1, 1])
+
+
+def test_light_given_up_in_the_depth_is_made_up_for():
+    """1.9 and 0.6 optical depths in the clearest channel, given up at depths beyond 1: the mean over those."""
+    world = traced(placed(box(8), CLEAR_AIR))
+    depths = np.linspace(0, 12, 481, dtype=np.float32)  # midpoints of exponential shares
+    weights = np.exp(-depths[:-1]) - np.exp(-depths[1:])
+    for x, length in ((0.2, 3.8), (2.8, 1.2)):
+        found = [
+            through(world, (x, 0.3, 0), (9, 0.3, 0), 1, FREE_DEPTH + np.float32([d + 0.0125])) for d in depths[:-1]
+        ]
+        assert_allclose(weights @ np.array(found), attenuation(length), rtol=0.02)
+        assert (found[0] == 0).all() == (length > 2)
+    outside = through(world, (9, 0.3, 0), (5, 0.3, 0), None, np.float32([1.0]))
+    assert_array_equal(outside, [1, 1, 1])
