@@ -63,7 +63,7 @@ class MediumWalk:
         self._achromatic = bool((self._sigma_t == self._sigma_t[0]).all())
         self._g = media.g[slot]
         straight = media.ior[slot] == 1
-        self._chance_shares = scene.lights.sampled
+        self._lights_sampled = scene.lights.sampled
         self._lit_by_areas = bool(straight) and scene.lights.sampled
         self._lit_inside = self._lit_by_areas or bool(scene.lights.points and straight)
         self._lit_inside |= bool(scene.holds_light[:, slot].any())
@@ -107,15 +107,13 @@ class MediumWalk:
         if weigh is not None:
             paths.throughput *= weigh(flight, arrived)
         paths.triangle[arrived] = triangle
-        if self._chance_shares:
-            paths.flown[arrived] += flight[arrived]
+        if self._lights_sampled:
+            self._note_flown(arrived, flight[arrived])
         paths.move(arrived, standing)
         if self._achromatic:
             # the flight's density cancels extinction; what is left at a collision is the albedo
             paths.throughput *= self._albedo
         paths.flies_on[:] = False
-        if self._chance_shares:
-            paths.density[:], paths.flown[:] = np.inf, 0
         paths.surfaces[:] = 0
         paths.branch[:] = CHANCE
         self._lose_leaked(radiance)
@@ -141,6 +139,14 @@ class MediumWalk:
             return henyey_greenstein(np.einsum("ij,ij->j", before, direction), self._g)
         return self._guide.density(np.einsum("ij,ij->j", self.paths.axis[:, index], direction))
 
+    def _note_flown(self, arrived: NDArray[np.intp], flight: Float32) -> None:
+        """Keep account of where the directions of the paths that meet a surface were drawn, and how."""
+        paths = self.paths
+        since_surface = paths.flies_on[arrived]
+        paths.flown[arrived] = paths.flown[arrived] * since_surface + flight
+        if not self._lit_by_areas:
+            paths.density[arrived[~since_surface]] = np.inf
+
     def _reach(self, position: Float32) -> Float32 | None:
         """(n,) how far around the positions (3, n) there is no surface for sure; None where nothing is known."""
         if self._grid is None:
@@ -160,6 +166,7 @@ class MediumWalk:
         paths.throughput[:, deep] *= self._jumps.jump(which, uniforms, position, direction)
         paths.origin[:, deep], paths.direction[:, deep] = position, direction
         paths.flies_on[deep] = True
+        paths.density[deep] = np.inf
         bound[deep] = self._grid.distance(position, np.empty(len(deep), np.float32), self._scratch)
 
     def _turn_guided(self, guide: Guide, u_cosine: Float32, u_turn: Float32, flight: Float32):

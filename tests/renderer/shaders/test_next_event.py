@@ -16,7 +16,7 @@ from renderer.shaders import boundary, direct_light, point_light
 from renderer.tracing.acceleration import Acceleration
 from renderer.wavefront import Wavefront
 from sss_tools.mesh import Mesh
-from sss_tools.shapes import box, icosphere
+from sss_tools.shapes import box, icosphere, moved
 from tests.assertions import assert_mean, seed, shared_rate
 from tests.renderer.scenes import camera, diffuse, placed, scene, translucent, wavefront
 
@@ -241,3 +241,16 @@ def test_highlights_of_fast_shaders_keep_their_mean():
         by_chance_alone(patch)
         alone = film(8)
     assert_same_mean(both, alone, 0.02, FALSE_ALARM)
+
+
+def test_surfaces_inside_dense_media_find_a_lamp_that_is_there_too():
+    """Paths that leave the surface collide before they meet the lamp: then it counts whole. Sees 3 %."""
+    inner = placed(moved(box(0.8), (0, -0.4, 0)), diffuse(0.9), name="inner")
+    outer = placed(box(2.0), translucent(0.95, 1.0, 0.0, 1.5), name="outer")
+    of = scene([inner, outer], [shining_ball((0, 0.55, 0), 0.35)], VIEW)
+    case = Case(lambda: of, 250, 0.03, 1)
+    both = samples(case, 9)
+    with pytest.MonkeyPatch.context() as patch:
+        by_chance_alone(patch)
+        alone = samples(case, 10)
+    assert_same_mean(both, alone, case.detects, FALSE_ALARM)
