@@ -56,7 +56,10 @@ def meet_boundary(
     lost = at.contradictory(scene)
     if lost.any():
         for slot in np.unique(at.slot[lost]):
-            lose(scene, paths, index[lost & (at.slot == slot)], int(slot), uniforms, tally, radiance)
+            mine = index[lost & (at.slot == slot)]
+            lose(scene, paths, mine, int(slot), uniforms, tally, radiance)
+            if scene.translucent[slot].hole_handling == "strict":
+                tally.contradicted += len(mine)
         at = at.take(np.flatnonzero(~lost))
     if not len(at.index):
         return

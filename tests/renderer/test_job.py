@@ -35,7 +35,8 @@ def test_what_is_left_of_a_budget():
 
 
 def test_passes_are_rendered_and_written_and_the_checkpoint_goes(tmp_path, monkeypatch):
-    monkeypatch.setattr(job, "CHECKPOINT_EVERY", 0.0)
+    monkeypatch.setattr(job, "REFRESH_EVERY", 0.0)
+    monkeypatch.setattr(job, "REFRESH_SHARE", 1e9)
     seen = []
     out = tmp_path / "out.npz"
 
