@@ -92,8 +92,8 @@ def execute(
 
     def finished() -> bool:
         if budget.seconds is not None:
-            # one more pass and the writing must still fit
-            return pass_seconds > seconds_left()
+            # half of the next pass is under way; what will not be done in time would be dropped
+            return pass_seconds / 2 > seconds_left()
         return budget.target_error is not None and _enough(renderer.film, error, budget.target_error)
 
     def seconds_left() -> float:

@@ -153,7 +153,7 @@ def test_choosing_samples_by_themselves_would_be_seen():
 def corner_scene(resolution=(40, 40)):
     """A pale ball, and a dark one in the corner: of its paths few return."""
     pale = placed(shapes.icosphere(1.0, 2), translucent(0.95, 4.0), name="pale")
-    dark = placed(shapes.moved(shapes.icosphere(0.4, 2), (-1.3, 1.3, 0)), translucent(0.1, 40.0, ior=1.0), name="dark")
+    dark = placed(shapes.moved(shapes.icosphere(0.4, 2), (-1.3, 1.3, 0)), translucent(0.3, 40.0, ior=1.0), name="dark")
     sky = replace(WHITE_SKY, radiance=np.full(3, 0.3))
     return scene([pale, dark], [sky], camera((0, 0, 7), resolution=resolution))
 
