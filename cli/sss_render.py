@@ -5,7 +5,8 @@ from __future__ import annotations
 import json
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -21,12 +22,28 @@ if TYPE_CHECKING:
     from renderer.scene.description import Scene
 
 PROGRAM = "sss-render"
-LEAKS_WORTH_A_WARNING = 1e-3
 
 
 def main(argv: Sequence[str] | None = None) -> int:
     """The command. Returns the exit status: 0 written, 2 refused, 130 interrupted with what was done written."""
-    return run(PROGRAM, _render, argv)
+    with _ended_like_ctrl_c():
+        return run(PROGRAM, _render, argv)
+
+
+@contextmanager
+def _ended_like_ctrl_c() -> Iterator[None]:
+    """Take SIGTERM, by which batch systems end jobs, for Ctrl-C."""
+    import signal
+    import threading
+
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGTERM, signal.default_int_handler)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before if before is not None else signal.SIG_DFL)
 
 
 def _render(argv: Sequence[str] | None) -> int:
@@ -40,11 +57,13 @@ def _render(argv: Sequence[str] | None) -> int:
     if options.export is not None:
         return _export(options, parser)
 
-    from renderer.job import execute, guide_arrays, report
+    from renderer.job import execute, guide_arrays, rare_event_warnings, report
     from renderer.output.image import check_writable
     from renderer.render import Renderer, Settings, Stages
 
     check_writable(options.output)
+    if options.preview is not None:
+        check_writable(options.preview)
     if options.report is not None:
         _check_report(options.report)
     stages = Stages()
@@ -69,11 +88,12 @@ def _render(argv: Sequence[str] | None) -> int:
             advance(share - shown, text)
             shown = share
 
-        picture = execute(renderer, options.output, budget, options.resume, aovs, show)
+        picture = execute(renderer, options.output, budget, options.resume, aovs, show, options.preview)
     total = time.time() - started
-    _warn_of_leaks(renderer)
+    for text in rare_event_warnings(renderer):
+        complain(PROGRAM, text, "warning")
     if options.report is not None:
-        text = json.dumps(report(renderer, picture, version(), total), indent=1)
+        text = json.dumps(report(renderer, picture, version(), total, budget), indent=1)
         _write_report(options.report, text)
     if not options.quiet:
         print(f"{options.output}: {picture.film.passes} passes in {total:.1f} s")
@@ -99,6 +119,10 @@ def _parser() -> ArgumentParser:
     amount.add_argument("--target-error", type=_positive, metavar="E",
                         help="stop at this mean relative standard error")  # fmt: skip
     amount.add_argument("--pass-range", type=_pass_range, metavar="A:B", help="passes A up to, not including, B")
+    parser.add_argument("--adaptive", action="store_true",
+                        help="more passes where there is more noise, without bias")  # fmt: skip
+    parser.add_argument("--preview", type=Path, metavar="FILE",
+                        help="picture to watch, kept up to date: .png, .exr or .npz")  # fmt: skip
     parser.add_argument("--seed", type=_whole, default=0, metavar="K", help="of the random numbers (default: 0)")
     parser.add_argument("--threads", type=_positive_int, metavar="N", help="default: one a core")
     parser.add_argument("--scheduler", metavar="ADDRESS", help="of a cluster")
@@ -124,6 +148,9 @@ def _refuse(options: Any) -> None:
         raise unavailable("--scheduler")
     if options.hole_handling == "cap":
         raise unavailable("--hole-handling cap", "use terminate")
+    if options.adaptive and options.pass_range is not None:
+        raise InputError("--adaptive", "decides later passes by earlier ones, so it has no part of a render to itself",
+                         "leave out --pass-range, or --adaptive")  # fmt: skip
     if options.material is not None and _is_scene(options.scene):
         raise InputError("--material", "is for bare meshes", "set the material in the scene file")
 
@@ -184,8 +211,8 @@ def _budget(options: Any, started: float) -> Budget:
         first, last = options.pass_range
         return Budget(first, last, started=started)
     if options.time is not None or options.target_error is not None:
-        return Budget(0, None, options.time, options.target_error, started)
-    return Budget(0, options.passes or DEFAULT_PASSES, started=started)
+        return Budget(0, None, options.time, options.target_error, options.adaptive, started)
+    return Budget(0, options.passes or DEFAULT_PASSES, adaptive=options.adaptive, started=started)
 
 
 def _explain(renderer: Renderer) -> None:
@@ -201,19 +228,6 @@ def _explain(renderer: Renderer) -> None:
             f"{plan.name}: {plan.state}{holes} ({renderer.sources[plan.name]}); hole handling {plan.hole_handling}; "
             f"shader {plan.shader} at distance {plan.distance:.4g}: {plan.reason}"
         )
-
-
-def _warn_of_leaks(renderer: Renderer) -> None:
-    tally = renderer.tally
-    if tally.samples and tally.leaked > LEAKS_WORTH_A_WARNING * tally.samples:
-        complain(
-            PROGRAM,
-            f"{tally.leaked} of {tally.samples} paths contradicted a surface taken for closed; check the mesh with "
-            "sss-check, or use --hole-handling terminate",
-            "warning",
-        )
-    if renderer.film.non_finite:
-        complain(PROGRAM, f"{renderer.film.non_finite} samples were not finite and are left out", "warning")
 
 
 def _check_report(path: Path) -> None:

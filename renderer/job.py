@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 import sys
 import time
+import warnings
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -14,6 +16,7 @@ from numpy.typing import NDArray
 
 from sss_tools.errors import InputError
 
+from . import adaptive
 from .output import image, passes
 from .output.film import Film
 from .output.image import Picture
@@ -21,8 +24,14 @@ from .render import Renderer
 from .scene.description import DirectionalLight, PointLight, RectangleLight, SceneObject, SphereLight, Translucent
 
 DEFAULT_PASSES = 64
-CHECKPOINT_EVERY = 1.0
-"""Seconds between checkpoints; each costs a few percent of that."""
+REFRESH_EVERY, REFRESH_SHARE = 1.0, 0.05
+"""Checkpoint and preview are written at most once in so many seconds, and take at most this share of the time each."""
+LEAST_PASSES_FOR_ERROR = 4
+"""A target error is not met by fewer: of two samples the square root of the variance is 20 % too small in the mean, of
+four 8 %."""
+LEAK_BUDGET, LOSS_BUDGET = 1e-5, 1e-3
+"""Share of the paths that may contradict a closed surface, and that may be lost at holes, before it is worth a
+warning."""
 
 
 @dataclass(frozen=True)
@@ -32,6 +41,7 @@ class Budget:
     last          one past the last pass; None where seconds or target_error decide
     seconds       wall seconds since ``started`` until the file is written
     target_error  mean relative standard error over object pixels
+    adaptive      noisy pixels take part in more passes than others, see ``adaptive``
     started       when the command began, by ``time.time``
     """
 
@@ -39,6 +49,7 @@ class Budget:
     last: int | None = DEFAULT_PASSES
     seconds: float | None = None
     target_error: float | None = None
+    adaptive: bool = False
     started: float = 0.0
 
     def left(self, done: passes.Ranges) -> range | list[int]:
@@ -55,9 +66,11 @@ def execute(
     resume: bool = False,
     aovs: dict[str, NDArray] | None = None,
     progress: Callable[[float, float, str], None] | None = None,
+    preview: Path | None = None,
 ) -> Picture:
     """Render until the budget is used up and write the picture.
 
+    preview   a picture that is kept up to date while rendering, of any kind
     progress  is told what is done, of how much, and in which words
 
     A checkpoint beside the output keeps what is done of a render that dies; ``resume`` goes on from it, or from the
@@ -66,47 +79,53 @@ def execute(
     """
     image.check_writable(output)
     checkpoint = checkpoint_path(output)
+    kept = [_Refreshed(checkpoint, time.time() + REFRESH_EVERY)]
+    if preview is not None:
+        image.check_writable(preview)
+        if preview.resolve() in (output.resolve(), checkpoint.resolve()):
+            raise InputError(preview, "is a file of the render itself", "give --preview another name")
+        kept.append(_Refreshed(preview))
     if resume:
         renderer.film = _resumed(renderer.film, output, checkpoint)
-    written_at = pass_at = time.time()
-    pass_seconds = 0.0
+    pass_at = time.time()
+    pass_seconds, error = 0.0, float("nan")
 
     def finished() -> bool:
         if budget.seconds is not None:
-            # one more pass and the writing must still fit
-            return time.time() + pass_seconds + 0.2 > budget.started + budget.seconds
-        if budget.target_error is not None:
-            error = renderer.film.mean_relative_stderr()
-            measured = np.isfinite(error)
-            return (measured and error <= budget.target_error) or (
-                not measured and renderer.film.passes >= DEFAULT_PASSES
-            )
-        return False
+            # half of the next pass is under way; what will not be done in time would be dropped
+            return pass_seconds / 2 > seconds_left()
+        return budget.target_error is not None and _enough(renderer.film, error, budget.target_error)
 
     def seconds_left() -> float:
         assert budget.seconds is not None
-        return budget.started + budget.seconds - time.time()
+        writing = max(0.1, *(file.seconds for file in kept)) * len(kept)
+        return budget.started + budget.seconds - time.time() - writing
 
     def after_pass(index: int) -> bool:
-        nonlocal written_at, pass_at, pass_seconds
+        nonlocal pass_at, pass_seconds, error
         now = time.time()
         pass_seconds, pass_at = now - pass_at, now
-        if now - written_at >= CHECKPOINT_EVERY:
-            image.write(checkpoint, renderer.picture(now - budget.started))
-            written_at = time.time()
+        if budget.target_error is not None:
+            error = renderer.film.mean_relative_stderr()
+        for file in kept:
+            file.refresh(renderer, budget)
         if progress is not None:
-            progress(*_progress(renderer, budget, now))
+            progress(*_progress(renderer, budget, now, error))
         return finished()
 
     def write() -> Picture:
         with renderer.stages.stage("write"):
             picture = renderer.picture(time.time() - budget.started, aovs)
             image.write(output, picture)
+        if preview is not None:
+            _Refreshed(preview).refresh(renderer, budget)
         return picture
 
     try:
+        if resume:
+            error = renderer.film.mean_relative_stderr()
         if not (resume and renderer.film.passes and finished()):
-            renderer.run(budget.left(renderer.film.ranges), after_pass, seconds_left if budget.seconds else None)
+            _run(renderer, budget, after_pass, seconds_left if budget.seconds else None)
     except KeyboardInterrupt:
         if renderer.film.passes:
             write()
@@ -116,6 +135,60 @@ def execute(
     picture = write()
     checkpoint.unlink(missing_ok=True)
     return picture
+
+
+def _run(
+    renderer: Renderer,
+    budget: Budget,
+    after_pass: Callable[[int], bool],
+    seconds_left: Callable[[], float] | None,
+) -> None:
+    """Add the passes that the budget asks for."""
+    left = budget.left(renderer.film.ranges)
+    if not budget.adaptive:
+        renderer.film.resting[:] = False
+        renderer.run(left, after_pass, seconds_left)
+        return
+    for part, decide in adaptive.rounds(left):
+        if decide:
+            renderer.film.resting = adaptive.resting(renderer.film, budget.target_error)
+        if not renderer.run(part, after_pass, seconds_left, ~renderer.film.resting):
+            return
+
+
+def _enough(film: Film, error: float, target: float) -> bool:
+    """Whether the film has so small an error; where none can be measured, whether it has the default passes."""
+    if not np.isfinite(error):
+        return film.passes >= DEFAULT_PASSES
+    return error <= target and film.passes >= LEAST_PASSES_FOR_ERROR
+
+
+@dataclass
+class _Refreshed:
+    """A file that is written again and again, whole or not at all, from ``due`` on.
+
+    seconds  what writing it took the last time
+    """
+
+    path: Path
+    due: float = 0.0
+    seconds: float = 0.0
+
+    def refresh(self, renderer: Renderer, budget: Budget) -> None:
+        """Write the film so far, if it is time."""
+        start = time.time()
+        if start < self.due:
+            return
+        try:
+            image.write(self.path, renderer.picture(start - budget.started))
+        except InputError as error:
+            # the render goes on without
+            warnings.warn(f"{error.line()}; it is kept up to date no longer", stacklevel=2)
+            self.due = math.inf
+            return
+        end = time.time()
+        self.seconds = end - start
+        self.due = end + max(REFRESH_EVERY, self.seconds / REFRESH_SHARE)
 
 
 def checkpoint_path(output: Path) -> Path:
@@ -138,25 +211,53 @@ def _resumed(blank: Film, output: Path, checkpoint: Path) -> Film:
     return film
 
 
-def _progress(renderer: Renderer, budget: Budget, now: float) -> tuple[float, float, str]:
+def _progress(renderer: Renderer, budget: Budget, now: float, error: float) -> tuple[float, float, str]:
     film = renderer.film
     text = f"pass {film.passes}"
     if budget.seconds is not None:
         return now - budget.started, budget.seconds, text
     if budget.target_error is not None:
-        error = film.mean_relative_stderr()
         done = (budget.target_error / error) ** 2 if np.isfinite(error) and error > 0 else 0.0
         return min(done, 1.0), 1.0, text
     assert budget.last is not None
     return film.passes, budget.last - budget.first, text
 
 
-def report(renderer: Renderer, picture: Picture, version: str, total: float) -> dict[str, Any]:
+def rare_event_warnings(renderer: Renderer) -> list[str]:
+    """What the user should know of rare events that were not rare enough."""
+    tally = renderer.tally
+    found = []
+    if _beyond(tally.leaked, LEAK_BUDGET * tally.samples):
+        found.append(
+            f"{tally.leaked} of {tally.samples} paths ({tally.leaked / tally.samples:.1e}; {LEAK_BUDGET:.0e} would be "
+            "usual) contradicted a surface taken for closed; check the mesh with sss-check, or use "
+            "--hole-handling terminate"
+        )
+    if _beyond(tally.terminated, LOSS_BUDGET * tally.samples):
+        found.append(
+            f"{tally.terminated} of {tally.samples} paths ({tally.terminated / tally.samples:.1e}) ended at holes, "
+            "with the colour of the material: light near them is wrong; repair the mesh with sss-check --unsafe-fixes"
+        )
+    if renderer.film.non_finite:
+        share = renderer.film.non_finite / max(renderer.film.hits.size * renderer.film.passes, 1)
+        found.append(f"{renderer.film.non_finite} samples ({share:.1e} of all) were not finite and are left out")
+    return found
+
+
+def _beyond(count: int, expected: float) -> bool:
+    """Whether chance would hardly (2 in a thousand) make so many of so many expected."""
+    return count > expected + 3 * expected**0.5 + 1
+
+
+def report(
+    renderer: Renderer, picture: Picture, version: str, total: float, budget: Budget | None = None
+) -> dict[str, Any]:
     """The JSON object of ``--report``; ``total`` wall seconds of the command."""
     film, tally, seconds = picture.film, renderer.tally, renderer.stages.seconds
     error = film.mean_relative_stderr()
     stages = {name: seconds.get(name, 0.0) for name in ("load", "check", "build", "render", "write")}
-    rendered_now = max(tally.samples // (film.resolution[0] * film.resolution[1]), 1)
+    rendered_now = max(renderer.added, 1)
+    target = None if budget is None else budget.target_error
     return {
         "schema": "sss-render/1",
         "version": version,
@@ -169,8 +270,13 @@ def report(renderer: Renderer, picture: Picture, version: str, total: float) -> 
         "rays": tally.rays,
         "bounces": tally.collisions,
         "mean_relative_stderr": float(error) if np.isfinite(error) else None,
+        "target_error": target,
+        "target_met": None if target is None else bool(error <= target),
+        "adaptive": bool(budget is not None and budget.adaptive),
+        "samples": int(film.samples().sum()),
         "rare_events": {
             "leaked_rays": tally.leaked,
+            "parity_contradictions": tally.contradicted,
             "terminated_at_holes": tally.terminated,
             "non_finite": film.non_finite,
         },

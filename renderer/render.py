@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import threading
 import time
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
@@ -30,7 +31,7 @@ from .tracing.acceleration import Acceleration
 from .tracing.memory import keep_freed_memory
 from .tracing.tally import Tally
 from .tracing.traced_scene import TracedObject, TracedScene
-from .wavefront import Samples, Wavefront
+from .wavefront import NOTHING, Samples, Wavefront
 
 SHADER_ID = {"path": 0, "plumb": 1, "scalar": 2, "diffuse": 3}
 """In pictures; opaque objects and the background have -1."""
@@ -82,6 +83,7 @@ class Renderer:
     plans    what is done with each object, and why
     sources  by object name, where the verdict on its mesh comes from
     film     the passes so far
+    added    how many of them this renderer made
     tally    counts over all passes of this renderer
     stages   seconds for check, build and render
 
@@ -105,6 +107,7 @@ class Renderer:
             self.acceleration = Acceleration.chosen(self.traced, width * height)
             self.shader_id, self.object_id = self._identify()
         self.film = Film.blank(scene.camera.resolution, planned_hash(scene, self.plans), settings.seed)
+        self.added = 0
         # their buffers outlive the threads of one ``run``
         self._idle: SimpleQueue[Wavefront] = SimpleQueue()
 
@@ -113,60 +116,86 @@ class Renderer:
         passes: Iterable[int],
         done: Callable[[int], bool] | None = None,
         seconds_left: Callable[[], float] | None = None,
-    ) -> None:
-        """Add passes to the film, in the order given.
+        chosen: NDArray[np.bool_] | None = None,
+    ) -> bool:
+        """Add passes to the film, in the order given; whether all were added.
 
         done          is told the number of each pass when it is in the film; where it returns True, no more are
                       begun, and those under way are dropped. On KeyboardInterrupt the film keeps all whole passes
-        seconds_left  how long the caller wants to go on: passes taken together become fewer towards the end
+        seconds_left  how long the caller wants to go on: passes taken together become fewer towards the end, those
+                      that were taken together are kept together, and what is under way when the time is over is
+                      dropped unless the film has no pass yet. Of passes that are dropped for their length the
+                      picture knows nothing, a bias of the order of one pass among all (Glynn & Heidelberger 1990,
+                      "Bias properties of budget constrained simulations") times the correlation of a whole
+                      pass's length and brightness
+        chosen        (h, w) bool, the pixels that take part; None: all
         """
         threads = self.settings.threads or os.cpu_count() or 1
         begun: deque[_Batch] = deque()
         waiting = iter(passes)
+        pixels = None if chosen is None else np.flatnonzero(chosen)
+        count = self.film.hits.size if pixels is None else len(pixels)
+        stopped = threading.Event()
         with self.stages.stage("render"), ThreadPoolExecutor(threads) as pool:
-            pace = _Pace(max(_FIRST_SAMPLES // (self.camera.resolution[0] * self.camera.resolution[1]), 1))
+            pace = _Pace(1 if seconds_left else max(_FIRST_SAMPLES // max(count, 1), 1))
             try:
                 while True:
                     # enough units under way that no thread waits for the slowest unit of a pass
                     while sum(not unit.done() for batch in begun for unit in batch.units) < 2 * threads:
-                        numbers = list(islice(waiting, self._passes_at_once(pace, seconds_left)))
+                        numbers = list(islice(waiting, self._passes_at_once(pace, count, seconds_left)))
                         if not numbers:
                             break
-                        begun.extend(self._begin(pool, run, threads) for run in _consecutive(numbers))
+                        begun.extend(
+                            self._begin(pool, run, threads, pixels, count, stopped) for run in _consecutive(numbers)
+                        )
                     if not begun:
-                        return
+                        return True
                     batch = begun.popleft()
-                    samples = [unit.result() for unit in batch.units]
+                    try:
+                        samples = [unit.result(self._patience(seconds_left)) for unit in batch.units]
+                    except TimeoutError:
+                        return False
                     pace.learn(len(batch.passes), max(unit.seconds for unit in samples))
                     for k, index in enumerate(batch.passes):
-                        self._add(samples, k, index)
-                        if done is not None and done(index):
-                            return
+                        self._add(samples, k, index, chosen)
+                        ends = done is not None and done(index)
+                        if ends and (seconds_left is None or index == batch.passes[-1]):
+                            return False
             finally:
+                stopped.set()
                 for batch in begun:
                     for unit in batch.units:
                         unit.cancel()
 
-    def _passes_at_once(self, pace: _Pace, seconds_left: Callable[[], float] | None) -> int:
-        """How many passes the next unit takes."""
-        width, height = self.scene.camera.resolution
+    def _patience(self, seconds_left: Callable[[], float] | None) -> float | None:
+        """How long to wait for a unit; None: until it ends."""
+        return max(seconds_left(), 0) if seconds_left is not None and self.film.passes else None
+
+    def _passes_at_once(self, pace: _Pace, pixels: int, seconds_left: Callable[[], float] | None) -> int:
+        """How many passes of so many pixels the next unit takes."""
         if self._fast_bodies:
             return 1
         passes = pace.next_passes()
         if seconds_left is not None:
             passes = min(passes, pace.passes_in(seconds_left() / 4))
-        return max(min(passes, _UNIT_SAMPLES // (width * height)), 1)
+        return max(min(passes, _UNIT_SAMPLES // max(pixels, 1)), 1)
 
-    def _begin(self, pool: ThreadPoolExecutor, passes: range, threads: int) -> _Batch:
+    def _begin(
+        self,
+        pool: ThreadPoolExecutor,
+        passes: range,
+        threads: int,
+        chosen: NDArray[np.int64] | None,
+        pixels: int,
+        stopped: threading.Event,
+    ) -> _Batch:
         """Submit the units of some passes: whole pictures where there are many passes, else parts of one."""
-        width, height = self.scene.camera.resolution
-        pixels = width * height
         parts = (
             max(pixels // _UNIT_SAMPLES, min(2 * threads, pixels // _LEAST_UNIT_PIXELS), 1) if len(passes) == 1 else 1
         )
         bounds = np.linspace(0, pixels, parts + 1).astype(int)
         units = [
-            pool.submit(self._trace, passes.start, int(first), int(last), len(passes))
+            pool.submit(self._trace, passes.start, int(first), int(last), len(passes), chosen, stopped)
             for first, last in pairwise(bounds)
         ]
         return _Batch(passes, units)
@@ -175,7 +204,15 @@ class Renderer:
         """What is written to a file; ``seconds`` is the wall time to state in it."""
         return Picture(self.film, seconds, self.shader_id, self.object_id, aovs or {})
 
-    def _trace(self, first_pass: int, first: int, last: int, passes: int) -> Samples:
+    def _trace(
+        self,
+        first_pass: int,
+        first: int,
+        last: int,
+        passes: int,
+        chosen: NDArray[np.int64] | None,
+        stopped: threading.Event,
+    ) -> Samples:
         try:
             wavefront = self._idle.get_nowait()
         except Empty:
@@ -184,22 +221,28 @@ class Renderer:
             )
         try:
             start = time.perf_counter()
-            samples = wavefront.trace(first_pass, first, last, passes)
+            samples = wavefront.trace(first_pass, first, last, passes, chosen, stopped.is_set)
             samples.seconds = time.perf_counter() - start
             return samples
         finally:
             self._idle.put(wavefront)
 
-    def _add(self, units: list[Samples], k: int, index: int) -> None:
-        """Add the k-th pass of the units to the film, as pass ``index``."""
-        width, height = self.scene.camera.resolution
+    def _add(self, units: list[Samples], k: int, index: int, chosen: NDArray[np.bool_] | None) -> None:
+        """Add the k-th pass of the units, samples of the ``chosen`` pixels, to the film, as pass ``index``."""
         parts = [unit.of_pass(k) for unit in units]
-        radiance = np.concatenate([part for part, _ in parts], axis=1).T.reshape(height, width, 3)
-        first = np.concatenate([part for _, part in parts]).reshape(height, width)
+        radiance = np.concatenate([part for part, _ in parts], axis=1).T
+        first = np.concatenate([part for _, part in parts])
+        if chosen is None:
+            radiance, first = radiance.reshape(self.film.sum.shape), first.reshape(self.film.hits.shape)
+        else:
+            here, there = radiance, first
+            radiance, first = np.zeros(self.film.sum.shape, np.float32), np.full(chosen.shape, NOTHING)
+            radiance[chosen], first[chosen] = here, there
         # -1, nothing, is the last entry
         translucent = np.array([*(thing.medium is not None for thing in self.traced.objects), False])
         fast = np.array([*(thing.index in self._fast_bodies for thing in self.traced.objects), False])
-        self.film.add_pass(index, radiance, translucent[first], fast[first])
+        self.film.add_pass(index, radiance, translucent[first], fast[first], chosen)
+        self.added += 1
         if k == 0:
             for unit in units:
                 self.tally.add(unit.tally)
@@ -231,11 +274,11 @@ class _Pace:
     """
 
     def __init__(self, first: int):
-        self._passes, self._seconds = first, 0.0
+        self._passes, self._latest, self._seconds = first, first, 0.0
 
     def learn(self, passes: int, seconds: float) -> None:
         """A unit of so many passes took so long."""
-        self._passes, self._seconds = max(passes, self._passes), seconds
+        self._passes, self._latest, self._seconds = max(passes, self._passes), passes, seconds
 
     def next_passes(self) -> int:
         """Of the next unit."""
@@ -243,7 +286,7 @@ class _Pace:
 
     def passes_in(self, seconds: float) -> int:
         """How many fit into a time for sure."""
-        return int(self._passes * seconds / self._seconds) if self._seconds else 1
+        return int(self._latest * seconds / self._seconds) if self._seconds else 1
 
 
 def _consecutive(numbers: list[int]) -> Iterator[range]:

@@ -6,7 +6,7 @@ What a sample's paths do depends on their own streams alone, so results do not d
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import partial
 from operator import itemgetter
@@ -62,6 +62,10 @@ class Samples:
         return self.radiance[:, mine], self.first_object[mine]
 
 
+class Stopped(Exception):
+    """The samples are no longer wanted."""
+
+
 class Wavefront:
     """Traces camera samples; one instance a thread.
 
@@ -94,8 +98,19 @@ class Wavefront:
         # how each object answers a ray, for scenes with more than one kind of surface
         self._kind = [thing.shader for thing in scene.objects]
 
-    def trace(self, first_pass: int, first_pixel: int, last_pixel: int, passes: int = 1) -> Samples:
+    def trace(
+        self,
+        first_pass: int,
+        first_pixel: int,
+        last_pixel: int,
+        passes: int = 1,
+        chosen: NDArray[np.int64] | None = None,
+        stopped: Callable[[], bool] | None = None,
+    ) -> Samples:
         """Samples of the pixels in [first_pixel, last_pixel), counted along the rows, in ``passes`` passes.
+
+        chosen   pixels to sample; where given, the range is of its entries
+        stopped  asked every step; Stopped is raised where it returns True
 
         Pass after pass, pixel after pixel. Fast bodies are lit by other beams in each pass: with them in the scene
         there must be one pass.
@@ -103,6 +118,7 @@ class Wavefront:
         if passes > 1 and self._fast_bodies:
             raise ValueError("fast shaders take one pass at a time")
         self._first_pass, self._first_pixel, self._pixels = first_pass, first_pixel, last_pixel - first_pixel
+        self._chosen = chosen
         count = passes * self._pixels
         # the second half is for the branches of paths that split
         self._radiance = np.zeros((3, 2 * count), np.float32)
@@ -127,6 +143,9 @@ class Wavefront:
                 emitted += new
             elif taken == 0:
                 break
+            elif stopped is not None and stopped():
+                self._tally.take()
+                raise Stopped
             self._step()
         radiance = self._radiance[:, :count] + self._radiance[:, count:]
         result = Samples(radiance, self._first_object, passes, self._tally.take())
@@ -137,6 +156,8 @@ class Wavefront:
         samples = np.arange(first_sample, first_sample + count)
         passes, pixels = np.divmod(samples, max(self._pixels, 1))
         pixels += self._first_pixel
+        if self._chosen is not None:
+            pixels = self._chosen[pixels]
         streams = stream_keys(self.seed, passes + self._first_pass, pixels)
         jitter = np.stack(self._uniforms.draw(streams))
         direction = self.camera.directions(pixels, jitter)

@@ -14,11 +14,15 @@ from .passes import Ranges
 Float64 = NDArray[np.float64]
 
 _ARRAYS = ("sum", "sum_of_squares", "hits", "left_out", "biased")
+_UNEVEN_ARRAYS = ("skipped", "resting")
+"""In files only of films whose pixels do not all take part in all passes."""
 
 
 @dataclass(eq=False)
 class Film:
-    """Sums over camera samples; a pass is one sample in every pixel. Arrays are (h, w, ...), row 0 on top.
+    """Sums over camera samples; a pass is one sample in every pixel that takes part in it.
+
+    Arrays are (h, w, ...), row 0 on top.
 
     scene_hash      of the scene that the samples are of
     seed            of the random numbers
@@ -27,6 +31,8 @@ class Film:
     hits            (h, w) int32, samples that met a translucent object first
     left_out        (h, w) int32, samples with a channel that is NaN or infinite: counted, and not in the sums
     biased          (h, w) bool, pixels with samples of a shader whose standard error says nothing of its error
+    skipped         (h, w) int32, passes that a pixel took no part in
+    resting         (h, w) bool, pixels that take no part in the passes of the round under way (see ``adaptive``)
     ranges          the passes done
 
     Sums of n float64 numbers >= 0 are off by at most (n - 1) 1.1e-16 of their value, in whatever order they
@@ -43,6 +49,8 @@ class Film:
     hits: NDArray[np.int32]
     left_out: NDArray[np.int32]
     biased: NDArray[np.bool_]
+    skipped: NDArray[np.int32]
+    resting: NDArray[np.bool_]
     ranges: Ranges = ()
 
     @classmethod
@@ -58,6 +66,8 @@ class Film:
             hits=np.zeros(flat, np.int32),
             left_out=np.zeros(flat, np.int32),
             biased=np.zeros(flat, bool),
+            skipped=np.zeros(flat, np.int32),
+            resting=np.zeros(flat, bool),
         )
 
     @property
@@ -82,12 +92,14 @@ class Film:
         radiance: NDArray[np.float32],
         hit: NDArray[np.bool_],
         biased: NDArray[np.bool_] | None = None,
+        chosen: NDArray[np.bool_] | None = None,
     ) -> None:
         """Add pass number ``index``.
 
         radiance  (h, w, 3) float32
         hit       (h, w) bool, whether the sample met a translucent object first
         biased    (h, w) bool, whether a biased shader made it; None: nowhere
+        chosen    (h, w) bool, pixels that have a sample; None: all
 
         An interrupt leaves the film with the whole pass or without it. Raises ValueError for another shape and
         for a pass that was added before.
@@ -99,6 +111,8 @@ class Film:
         finite = np.logical_and.reduce(np.isfinite(radiance), axis=-1, keepdims=True)
         if not finite.all():
             radiance = np.where(finite, radiance, np.float32(0))
+        if chosen is not None:
+            radiance, hit, finite = radiance * chosen[..., None], hit & chosen, finite | ~chosen[..., None]
         self._take(
             ranges,
             self.sum + radiance,
@@ -106,6 +120,8 @@ class Film:
             self.hits + hit,
             self.left_out + ~finite[..., 0],
             self.biased if biased is None else self.biased | biased,
+            self.skipped if chosen is None else self.skipped + ~chosen,
+            self.resting,
         )
 
     def merge(self, other: Film) -> None:
@@ -125,23 +141,26 @@ class Film:
             self.hits + other.hits,
             self.left_out + other.left_out,
             self.biased | other.biased,
+            self.skipped + other.skipped,
+            self.resting | other.resting,
         )
 
-    def _take(self, ranges, total, squares, hits, left_out, biased) -> None:
+    def _take(self, ranges, total, squares, hits, left_out, biased, skipped, resting) -> None:
         # new arrays, put in place by plain assignments, between which no interrupt is delivered
         self.ranges, self.sum, self.sum_of_squares = ranges, total, squares
         self.hits, self.left_out, self.biased = hits, left_out, biased
+        self.skipped, self.resting = skipped, resting
 
     def mean(self) -> Float64:
         """(h, w, 3) mean radiance; NaN in pixels without a sample."""
-        return _ratio(self.sum, self._samples())
+        return _ratio(self.sum, self.samples()[..., None])
 
     def stderr(self) -> Float64:
         """(h, w, 3) standard error of the mean, sqrt(s^2 / n) with the unbiased variance s^2.
 
         NaN in pixels with fewer than two samples, and in biased ones.
         """
-        n = self._samples()
+        n = self.samples()[..., None]
         # rounding can leave a few ulps below zero where all samples are equal
         variance = np.maximum(_ratio(self.sum_of_squares - self.sum * _ratio(self.sum, n), n - 1), 0)
         error = np.sqrt(_ratio(variance, n))
@@ -150,7 +169,8 @@ class Film:
 
     def object_pixels(self) -> NDArray[np.bool_]:
         """(h, w) pixels whose every camera sample met a translucent object first."""
-        return (self.hits == self.passes) & (self.passes > 0)
+        taken = self.passes - self.skipped
+        return (self.hits == taken) & (taken > 0)
 
     def mean_relative_stderr(self) -> float:
         """Mean of stderr / mean over object pixels and channels.
@@ -162,9 +182,9 @@ class Film:
         usable = (mean > 0) & np.isfinite(error)
         return float((error[usable] / mean[usable]).mean()) if usable.any() else float("nan")
 
-    def _samples(self) -> NDArray[np.integer]:
-        """(h, w, 1) samples in the sums."""
-        return (self.passes - self.left_out)[..., None]
+    def samples(self) -> NDArray[np.int32]:
+        """(h, w) samples in the sums."""
+        return np.int32(self.passes) - self.left_out - self.skipped
 
     def arrays(self) -> dict[str, NDArray]:
         """Everything needed to go on or to merge, for a file."""
@@ -173,21 +193,25 @@ class Film:
             "film_seed": np.array(str(self.seed)),
             "film_ranges": np.array(self.ranges, np.int64).reshape(-1, 2),
             **{f"film_{name}": getattr(self, name) for name in _ARRAYS},
+            **{f"film_{name}": array for name in _UNEVEN_ARRAYS if (array := getattr(self, name)).any()},
         }
 
     @classmethod
     def from_arrays(cls, arrays: Mapping[str, NDArray]) -> Film:
         """The film that ``arrays`` were made of. Raises KeyError or ValueError for arrays of no film."""
+        even = np.zeros(arrays["film_hits"].shape)
+        uneven = {"skipped": even.astype(np.int32), "resting": even.astype(bool)}
         film = cls(
             scene_hash=str(arrays["film_scene_hash"]),
             seed=int(str(arrays["film_seed"])),
             ranges=passes.checked(arrays["film_ranges"]),
             **{name: arrays[f"film_{name}"] for name in _ARRAYS},
+            **{name: arrays.get(f"film_{name}", zeros) for name, zeros in uneven.items()},
         )
         if film.hits.ndim != 2:
             raise ValueError(f"hits has shape {film.hits.shape}")
         blank = cls.blank(film.resolution)
-        for name in _ARRAYS:
+        for name in (*_ARRAYS, *_UNEVEN_ARRAYS):
             array, like = getattr(film, name), getattr(blank, name)
             if array.shape != like.shape or array.dtype != like.dtype:
                 raise ValueError(f"{name} is {array.dtype} of shape {array.shape}")

@@ -36,11 +36,13 @@ class Picture:
     aovs: dict[str, NDArray] = field(default_factory=dict)
 
     def layers(self) -> dict[str, NDArray]:
-        """All arrays but the image, by name: standard error, shader, object, then ``aovs``."""
+        """All arrays but the image, by name: standard error, shader, object, the samples of each pixel
+        where they differ, then ``aovs``."""
         return {
             "stderr": self.film.stderr().astype(np.float32),
             "shader_id": np.asarray(self.shader_id, np.int32),
             "object_id": np.asarray(self.object_id, np.int32),
+            **({"samples": self.film.samples()} if self.film.skipped.any() else {}),
             **self.aovs,
         }
 

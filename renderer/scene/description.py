@@ -126,6 +126,8 @@ class SceneObject:
     normals     "flat" or "smooth" shading normals
     shader      what the scene asks for; "auto" leaves it to the selection
     closedness  what the check found; None until it ran
+    reflected_share  probability with which a path at the boundary follows the reflection, from the second boundary on
+                (a path's first is split), weighed so that the mean stays; None: the Fresnel reflectance
     source      the mesh as its file has it, before the transform: records beside the file are about this one
     """
 
@@ -136,6 +138,7 @@ class SceneObject:
     normals: Literal["flat", "smooth"] = "flat"
     shader: ShaderChoice = "auto"
     hole_handling: HoleHandling = "auto"
+    reflected_share: float | None = None
     closedness: Closedness | None = None
     source: Mesh | None = None
 

@@ -103,6 +103,7 @@ _OBJECT = {
     "transform": Key(_ANYTHING, {}),
     "shader": Key(one_of(["auto", "path", "plumb", "scalar"]), "auto"),
     "hole_handling": Key(one_of(["auto", "strict", "cap", "terminate", "surface"]), "auto"),
+    "reflected_share": Key(Kind("a probability from 0.01 to 0.99", to_number, lambda p: 0.01 <= p <= 0.99), None),
 }
 
 
@@ -123,6 +124,7 @@ class Placement:
     normals: Literal["flat", "smooth"]
     shader: ShaderChoice
     hole_handling: HoleHandling
+    reflected_share: float | None
     place: Place
 
 
@@ -266,6 +268,7 @@ def _placements(tables: Any, materials: dict[str, Material], path: Path) -> tupl
             normals=values["normals"],
             shader=values["shader"],
             hole_handling=values["hole_handling"],
+            reflected_share=values["reflected_share"],
             place=place,
         )
     return tuple(placements.values())
@@ -281,6 +284,7 @@ def _object(placement: Placement, meshes: dict[Path, Mesh]) -> SceneObject:
         normals=placement.normals,
         shader=placement.shader,
         hole_handling=placement.hole_handling,
+        reflected_share=placement.reflected_share,
         source=source,
     )
 

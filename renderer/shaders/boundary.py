@@ -56,7 +56,10 @@ def meet_boundary(
     lost = at.contradictory(scene)
     if lost.any():
         for slot in np.unique(at.slot[lost]):
-            lose(scene, paths, index[lost & (at.slot == slot)], int(slot), uniforms, tally, radiance)
+            mine = index[lost & (at.slot == slot)]
+            lose(scene, paths, mine, int(slot), uniforms, tally, radiance)
+            if scene.translucent[slot].hole_handling == "strict":
+                tally.contradicted += len(mine)
         at = at.take(np.flatnonzero(~lost))
     if not len(at.index):
         return
@@ -69,7 +72,13 @@ def meet_boundary(
     smooth = np.flatnonzero(~straight & ~rough)
     if len(smooth):
         turned[:, smooth], reflected[smooth] = _turn(
-            at.direction[:, smooth], at.facing[:, smooth], at.eta[smooth], choice[smooth], paths, at.index[smooth]
+            at.direction[:, smooth],
+            at.facing[:, smooth],
+            at.eta[smooth],
+            choice[smooth],
+            paths,
+            at.index[smooth],
+            _reflected_share(scene, at.slot[smooth]),
         )
     for slot, thing in enumerate(scene.translucent) if rough.any() else ():
         mine = np.flatnonzero(rough & (at.slot == slot))
@@ -93,8 +102,20 @@ def meet_boundary(
     paths.origin[:, at.index] = offset_from(at.position, at.near_normal, side)
 
 
+def _reflected_share(scene: TracedScene, slot: NDArray[np.integer]) -> Float32 | None:
+    """(n,) what the objects ask for, NaN for nothing; None where none of the scene asks."""
+    shares = np.array([thing.reflected_share for thing in scene.translucent], np.float32)
+    return None if np.isnan(shares).all() else shares[slot]
+
+
 def _turn(
-    direction: Float32, normal: Float32, eta: Float32, u: Float32, paths: Paths, index: NDArray[np.intp]
+    direction: Float32,
+    normal: Float32,
+    eta: Float32,
+    u: Float32,
+    paths: Paths,
+    index: NDArray[np.intp],
+    reflected_share: Float32 | None = None,
 ) -> tuple[Float32, NDArray[np.bool_]]:
     """Snell's law and Fresnel's choice: new directions (3, n), and whether they are reflected.
 
@@ -102,11 +123,19 @@ def _turn(
     eta        (n,) index beyond over before
     u          (n,) uniforms: reflected where they are below the reflectance. The two branches of a split path have
                no choice, and are weighed by their share instead
+    reflected_share  (n,) probability of reflection in place of the reflectance, with the weight that keeps the mean;
+               NaN for none
     """
     cos_in = np.clip(-np.einsum("ij,ij->j", direction, normal), 0, 1)
     reflectance, cos_out = fresnel_reflectance(cos_in, eta)
-    reflected = u < reflectance
     branch = paths.branch[index]
+    chance = reflectance
+    if reflected_share is not None:
+        asked = ~np.isnan(reflected_share) & (branch == CHANCE) & (reflectance < 1)
+        chance = np.where(asked, reflected_share, reflectance)
+    reflected = u < chance
+    if chance is not reflectance:
+        _weigh(paths, index[asked], reflectance[asked], chance[asked], reflected[asked])
     split = np.flatnonzero((branch == REFLECTS) | (branch == REFRACTS))
     if len(split):
         reflected[split] = branch[split] == REFLECTS
@@ -120,6 +149,15 @@ def _turn(
     turned = np.where(reflected, 1, inverse) * direction + along * normal
     turned /= np.sqrt(np.einsum("ij,ij->j", turned, turned))
     return turned, reflected
+
+
+def _weigh(paths: Paths, index, reflectance: Float32, chance: Float32, reflected: NDArray[np.bool_]) -> None:
+    """Weigh the paths ``index`` whose choice was made with other probabilities than the reflectance."""
+    weight = np.where(reflected, reflectance / chance, (1 - reflectance) / (1 - chance))
+    paths.throughput[:, index] *= weight
+    # as above: roulette would undo what was asked for
+    paths.faint[index] *= weight
+    paths.alive[index] &= weight > 0
 
 
 def _scatter_rough(
@@ -139,7 +177,8 @@ def _scatter_rough(
         speaks = np.flatnonzero(paths.branch[at.index] != REFLECTS)
         light_rough(scene, paths, at.take(speaks), frame.take(speaks), view[:, speaks], uniforms, tally, radiance)
     facet = sample_visible_facet(view, alpha, u1, u2)
-    turned, reflected = _turn(-view, facet, at.eta, choice, paths, at.index)
+    share = _reflected_share(scene, at.slot)
+    turned, reflected = _turn(-view, facet, at.eta, choice, paths, at.index, share)
     # single scattering: what ends on the wrong side would meet a second facet, and is lost
     valid = np.where(reflected, turned[2] > 0, turned[2] < 0)
     paths.throughput[:, at.index] *= np.where(valid, unmasked(turned[2], alpha), 0)

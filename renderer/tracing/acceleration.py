@@ -20,6 +20,8 @@ _TYPICAL_PASSES, _TYPICAL_SHARE = 64, 0.3
 time saved."""
 JUMP_ALBEDO, JUMP_INRADIUS = 0.97, 10.0
 """Least albedo and mean inradius (mean free paths) of bodies in which ball jumps pay."""
+LEAST_GUIDE_ALBEDO = 0.2
+"""Below, the guide's nu0 = 1 + 2 exp(-2 / albedo) is 1 in float32: 4e-9 above it at 0.1."""
 GUIDE_ALBEDO, STRONG_GUIDE_ALBEDO, STRONG_GUIDE_SIZE = 0.995, 0.98, 16.0
 """Under a sky, guided flights save two thirds of the work at albedo 0.6 and nothing at 0.998. Three of four flights are
 guided, and not two, where no light that goes deep (bodies of many mean free paths) comes back (albedo), and where no
@@ -102,7 +104,12 @@ def _guide(scene: TracedScene, thing: TracedObject) -> Guide | None:
     assert medium is not None
     albedo = float(medium.single_scattering_albedo.mean())
     sigma_t = float(medium.sigma_t[0])
-    if medium.g != 0 or not medium.is_achromatic or scene.lights.points or not 0 < albedo <= GUIDE_ALBEDO:
+    if (
+        medium.g != 0
+        or not medium.is_achromatic
+        or scene.lights.points
+        or not LEAST_GUIDE_ALBEDO <= albedo <= GUIDE_ALBEDO
+    ):
         return None
     size = float((thing.upper - thing.lower).max()) * sigma_t
     lamps = scene.lights.rectangles or scene.lights.spheres

@@ -9,18 +9,20 @@ from dataclasses import dataclass, fields
 class Tally:
     """Sums over camera samples; tallies of different work units add up.
 
-    samples     camera samples
-    rays        rays cast, shadow rays included
-    collisions  scatterings inside media
-    leaked      paths that contradicted a closed surface: a ray slipped between two triangles
-    terminated  paths that left (or saw inside) through a hole of an object handled by ``terminate``
-    non_finite  camera samples without a finite value, left out of the picture
+    samples       camera samples
+    rays          rays cast, shadow rays included
+    collisions    scatterings inside media
+    leaked        paths that contradicted a closed surface: a ray slipped between two triangles
+    contradicted  those of them that were found by a crossing that does not fit the count of surfaces
+    terminated    paths that left (or saw inside) through a hole of an object handled by ``terminate``
+    non_finite    camera samples without a finite value, left out of the picture
     """
 
     samples: int = 0
     rays: int = 0
     collisions: int = 0
     leaked: int = 0
+    contradicted: int = 0
     terminated: int = 0
     non_finite: int = 0
 

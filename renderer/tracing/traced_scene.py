@@ -32,6 +32,7 @@ class TracedObject:
     first_triangle where its triangles begin among the scene's
     medium         coefficients per unit of the frame; None for opaque objects
     roughness      GGX alpha of the boundary
+    reflected_share  probability of following the reflection at the boundary, NaN: the reflectance
     colour         (3, 1) reflectance of opaque objects, diffuse reflectance of the media of translucent ones
     shader         "path", "plumb", "scalar" or "diffuse" for translucent objects, "opaque" or "mirror"
     hole_handling  "strict", "terminate" or "surface"
@@ -43,6 +44,7 @@ class TracedObject:
     first_triangle: int
     medium: Medium | None
     roughness: float
+    reflected_share: float
     colour: Float32
     shader: str
     hole_handling: str
@@ -157,6 +159,7 @@ class TracedScene:
             first_triangle=first,
             medium=medium,
             roughness=roughness,
+            reflected_share=np.nan if thing.reflected_share is None else thing.reflected_share,
             colour=np.asarray(colour, np.float32).reshape(3, 1),
             shader=shader,
             hole_handling=handling,

@@ -96,7 +96,12 @@ def test_the_report_has_the_fields_of_the_contract(workplace):
     assert seconds["frame"] == pytest.approx(seconds["render"] / 2)
     assert seconds["total"] >= sum(seconds[name] for name in ("load", "check", "build", "render", "write"))
     assert report["rays"] > 0 and report["bounces"] > 0 and report["peak_memory"] > 10_000_000
-    assert report["rare_events"] == {"leaked_rays": 0, "terminated_at_holes": 0, "non_finite": 0}
+    assert report["rare_events"] == {
+        "leaked_rays": 0,
+        "parity_contradictions": 0,
+        "terminated_at_holes": 0,
+        "non_finite": 0,
+    }
 
 
 def test_the_mean_relative_standard_error_is_over_pixels_that_always_show_the_object(workplace):
@@ -198,22 +203,81 @@ def test_time_counts_from_process_start_and_overshoots_by_one_pass_at_most(workp
     assert seconds["total"] >= budget - 2 * seconds["frame"] - 1.0
 
 
+def test_an_interrupt_does_not_wait_for_long_passes(workplace, start):
+    """A pass of this scene takes tens of seconds. Nothing is done by then, and nothing is written."""
+    edit("albedo = [0.9, 0.8, 0.7]", "albedo = [0.99999, 0.9999, 0.999]")
+    edit("sigma_t = 6.0", "sigma_t = [300.0, 500.0, 600.0]")
+    process = start(
+        "import sys; from cli.sss_render import main; sys.exit(main(sys.argv[1:]))",
+        *("scene.toml", "-o", "out.npz", "--shader", "path", "--size", "200x200"),
+    )
+    process.stdout.readline()  # what will be done, said before the first pass
+    time.sleep(2)
+    asked = time.monotonic()
+    process.send_signal(signal.SIGTERM)
+    assert process.wait(timeout=60) == 130
+    assert time.monotonic() - asked < 10
+    assert not Path("out.npz").exists()
+
+
+@pytest.mark.parametrize("size", ["8x8", "96x96"])
+def test_time_is_kept_where_passes_are_slow(workplace, start, size):
+    """Some 20 mean free paths to the centre and 100 collisions a path: 64 passes would take minutes."""
+    edit("albedo = [0.9, 0.8, 0.7]", "albedo = [0.99, 0.98, 0.97]")
+    edit("sigma_t = 6.0", "sigma_t = [20.0, 30.0, 40.0]")
+    begun = time.monotonic()
+    process = start(
+        "import sys; from cli.sss_render import main; sys.exit(main(sys.argv[1:]))",
+        *("scene.toml", "-o", "out.npz", "--time", "6", "--report", "report.json", "--shader", "path", "--size", size),
+    )
+    assert process.wait() == 0
+    took = time.monotonic() - begun
+    report = json.loads(Path("report.json").read_text())
+    assert report["passes"] >= 1
+    # with one pass done, what is under way is dropped: half a second for the steps, the writing and the exit
+    assert took <= 6.5 if report["passes"] > 1 else took <= 6.5 + report["seconds"]["render"]
+
+
+@pytest.mark.parametrize("kind", ["png", "exr", "npz"])
+def test_the_preview_ends_as_the_picture(workplace, kind):
+    render("--passes", 2, "--preview", f"preview.{kind}", out=f"out.{kind}")
+    if kind == "npz":
+        with np.load("preview.npz") as preview, np.load("out.npz") as out:
+            np.testing.assert_array_equal(preview["image"], out["image"])
+    else:
+        assert Path(f"preview.{kind}").read_bytes() == Path(f"out.{kind}").read_bytes()
+
+
+@pytest.mark.parametrize("name", ["out.npz", "out.npz.unfinished.npz", "preview.jpg", "missing/preview.png"])
+def test_previews_that_would_harm_the_picture_or_cannot_be_written_are_refused(workplace, name):
+    render("--preview", name, status=2)
+    assert not Path("out.npz").exists()
+
+
+def test_adaptive_passes_cannot_be_split(workplace, capsys):
+    render("--adaptive", "--pass-range", "0:4", status=2)
+    assert "--adaptive: decides later passes by earlier ones" in capsys.readouterr().err
+
+
 def test_a_target_error_is_met(workplace):
     report = reported("--target-error", 0.2)
-    assert report["mean_relative_stderr"] <= 0.2
+    assert report["mean_relative_stderr"] <= 0.2 and report["target_error"] == 0.2 and report["target_met"]
     # one pass fewer would not have done: the error falls with the root of the passes
-    assert report["mean_relative_stderr"] > 0.2 * 0.8 or report["passes"] == 2
+    assert report["mean_relative_stderr"] > 0.2 * 0.8 or report["passes"] == 4
 
 
-def test_ctrl_c_leaves_a_picture_of_whole_passes_and_status_130(workplace, start):
+@pytest.mark.parametrize("ended_by", [signal.SIGINT, signal.SIGTERM])
+def test_ctrl_c_leaves_a_picture_of_whole_passes_and_status_130(workplace, start, ended_by):
     process = start(
         "import sys; from cli.sss_render import main; sys.exit(main(sys.argv[1:]))",
         *("scene.toml", "-o", "out.npz", "--passes", "1000000", "--shader", "path", "--size", "64x64"),
+        *("--preview", "preview.png"),
     )
     checkpoint, patience = Path("out.npz.unfinished.npz"), time.monotonic() + 60
     while not checkpoint.exists() and process.poll() is None and time.monotonic() < patience:
         time.sleep(0.05)
-    process.send_signal(signal.SIGINT)
+    assert Path("preview.png").read_bytes().startswith(PNG_MAGIC) and not Path("out.npz").exists()
+    process.send_signal(ended_by)
     _, error = process.communicate(timeout=30)
     assert process.returncode == 130
     assert "Traceback" not in error and error.strip().count("\n") == 0
@@ -261,6 +325,21 @@ def test_paths_that_leave_through_a_hole_are_counted(workplace):
     assert reported("--passes", 4, "--shader", "path")["rare_events"]["terminated_at_holes"] > 0
     forced = reported("--passes", 4, "--shader", "path", "--hole-handling", "strict")
     assert forced["objects"][0]["hole_handling"] == "strict" and forced["rare_events"]["leaked_rays"] > 0
+
+
+def test_leaks_and_losses_are_warned_of_beyond_their_budgets(workplace, capsys):
+    """Planted by a hole: some percent of the paths."""
+    write_mesh(shapes.punctured(shapes.icosphere(1.0, 3), [[0, 1, 0]], 0.4), "ball.ply")
+    report = reported("--passes", 8, "--hole-handling", "strict")
+    events = report["rare_events"]
+    assert 0 < events["parity_contradictions"] <= events["leaked_rays"]
+    error = capsys.readouterr().err
+    assert f"warning: {events['leaked_rays']} of {8 * 480} paths (" in error and "taken for closed" in error
+    lost = reported("--passes", 8)["rare_events"]["terminated_at_holes"]
+    assert f"warning: {lost} of {8 * 480} paths (" in capsys.readouterr().err
+    write_mesh(shapes.icosphere(1.0, 3), "ball.ply")
+    reported("--passes", 8)
+    assert capsys.readouterr().err == ""
 
 
 def _judge(mesh):

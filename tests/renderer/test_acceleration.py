@@ -128,3 +128,12 @@ def test_what_is_chosen_does_not_depend_on_the_number_of_passes():
     """There is no way to ask for it: parts of a render must agree bit for bit."""
     of = scene([placed(box((1, 1, 1)), translucent([0.9] * 3, 5.0, 0.0, 1.3))], [WHITE_SKY], VIEW)
     assert chosen(of) == chosen(of)
+
+
+@pytest.mark.parametrize("albedo", [0.001, 0.05, 0.1, 0.2])
+def test_dark_media_are_rendered_without_a_complaint(albedo):
+    """The guide's pole is next to 1, below what float32 and at last float64 can tell from it."""
+    of = scene([placed(icosphere(1.0, 1), translucent(albedo, 40.0))], [WHITE_SKY], camera((0, 0, 5)))
+    traced = wavefront(of).scene
+    shown = picture(of, 16, acceleration=Acceleration.chosen(traced, 256))
+    assert np.isfinite(shown.samples).all()

@@ -35,7 +35,8 @@ def test_what_is_left_of_a_budget():
 
 
 def test_passes_are_rendered_and_written_and_the_checkpoint_goes(tmp_path, monkeypatch):
-    monkeypatch.setattr(job, "CHECKPOINT_EVERY", 0.0)
+    monkeypatch.setattr(job, "REFRESH_EVERY", 0.0)
+    monkeypatch.setattr(job, "REFRESH_SHARE", 1e9)
     seen = []
     out = tmp_path / "out.npz"
 
@@ -159,6 +160,51 @@ def test_seconds_a_frame_are_of_the_passes_of_this_run(tmp_path):
     seconds = report(renderer, picture, "0", 1.0)["seconds"]
     assert picture.film.passes == 5
     assert seconds["frame"] == pytest.approx(seconds["render"] / 2)
+
+
+@pytest.mark.parametrize(
+    ("samples", "leaked", "warns"),
+    [(10**4, 1, False), (10**4, 3, True), (10**8, 1000, False), (10**8, 1090, False), (10**8, 1100, True)],
+)
+def test_leaks_are_held_against_one_in_a_hundred_thousand_and_chance(samples, leaked, warns):
+    renderer = ready()
+    renderer.tally.samples, renderer.tally.leaked = samples, leaked
+    found = job.rare_event_warnings(renderer)
+    assert bool(found) == warns
+    assert not warns or f"{leaked} of {samples} paths" in found[0]
+
+
+def test_samples_that_are_not_finite_are_warned_of():
+    renderer = ready()
+    renderer.run(range(2))
+    assert job.rare_event_warnings(renderer) == []
+    renderer.film.left_out[0, 0] = 1
+    assert "1 samples (2.6e-03 of all) were not finite" in job.rare_event_warnings(renderer)[0]
+
+
+def test_a_preview_that_can_no_longer_be_written_does_not_end_the_render(tmp_path, monkeypatch):
+    monkeypatch.setattr(job, "REFRESH_EVERY", 0.0)
+    folder = tmp_path / "gone"
+    folder.mkdir()
+
+    def remove(done, total, text):
+        shutil.rmtree(folder, ignore_errors=True)
+
+    with pytest.warns(UserWarning, match="up to date no longer"):
+        execute(ready(), tmp_path / "out.npz", Budget(0, 5), progress=remove, preview=folder / "preview.png")
+    assert image.read(tmp_path / "out.npz").film.passes == 5
+
+
+def test_writing_again_and_again_takes_a_small_share_of_the_time(tmp_path, monkeypatch):
+    """A clock that writing moves on by 3 s: the next is due 60 s later."""
+    clock = [1000.0]
+    monkeypatch.setattr(job.time, "time", lambda: clock[0])
+    monkeypatch.setattr(job.image, "write", lambda *_: clock.__setitem__(0, clock[0] + 3))
+    kept, renderer = job._Refreshed(tmp_path / "preview.png"), ready()
+    kept.refresh(renderer, Budget())
+    assert kept.due == pytest.approx(1003 + 60)
+    kept.refresh(renderer, Budget())
+    assert clock[0] == 1003
 
 
 def test_the_bias_of_lights_without_extent_is_named_where_there_is_one():

@@ -217,5 +217,5 @@ def test_resolution_grows_with_the_work_and_no_grid_is_built_for_a_few_bounces()
     assert choose_resolution([Walks(100, mean_free_path=0.005, albedo=0.999, **ball)], np.ones(3)) is None
     assert choose_resolution([Walks(1e7, mean_free_path=0.02, albedo=0.6, **ball)], np.ones(3)) is None
     assert choose_resolution([Walks(1e7, mean_free_path=0.5, albedo=0.999, **ball)], np.ones(3)) is None
-    few, many = (Walks(n, mean_free_path=0.005, albedo=0.999, **ball) for n in (1e4, 1e7))
+    few, many = (Walks(n, mean_free_path=0.005, albedo=0.999, **ball) for n in (5e4, 1e7))
     assert choose_resolution([few], np.ones(3)) < choose_resolution([many], np.ones(3))
