@@ -17,6 +17,7 @@ from ..scene.lights import LightSet, PointSource
 from .beam_generation import Facets
 from .media import MediaTable
 from .refracted_beams import RefractedBeams
+from .touching import grown_where_touching
 from .unscattered import mirror_as_needed
 
 Float32 = NDArray[np.float32]
@@ -83,12 +84,15 @@ class TracedScene:
         self.scene = scene
         self.frame = UnitFrame.around(lower, upper)
         self.lights = LightSet(scene.lights, self.frame)
-        self.objects = [
-            self._traced(index, thing, shader, handling)
-            for index, (thing, shader, handling) in enumerate(zip(scene.objects, shaders, hole_handling, strict=True))
-        ]
-        vertices = [self.frame.points_in(thing.mesh.vertices) for thing in scene.objects]
         triangles = [thing.mesh.faces for thing in scene.objects]
+        vertices = [self.frame.points_in(thing.mesh.vertices) for thing in scene.objects]
+        vertices = grown_where_touching(vertices, triangles)
+        self.objects = [
+            self._traced(index, thing, shader, handling, points)
+            for index, (thing, shader, handling, points) in enumerate(
+                zip(scene.objects, shaders, hole_handling, vertices, strict=True)
+            )
+        ]
         owners = [np.full(len(thing.mesh.faces), index) for index, thing in enumerate(scene.objects)]
         self.first_light_triangle = sum(map(len, triangles))
         for rectangle in self.lights.rectangles:
@@ -144,14 +148,14 @@ class TracedScene:
         mirror_as_needed(self.caster, facets, beams, sigma_t)
         return beams
 
-    def _traced(self, index: int, thing: SceneObject, shader: str, handling: str) -> TracedObject:
+    def _traced(self, index: int, thing: SceneObject, shader: str, handling: str, points) -> TracedObject:
         material = thing.material
         if isinstance(material, Translucent):
             medium, roughness = material.medium.scaled(self.frame.scale), material.roughness
             colour = diffuse_reflectance(replace(medium, ior=1.0))
         else:
             medium, roughness, colour = None, 0.0, material.reflectance
-        bounds = self.frame.points_in(thing.mesh.bounds).astype(np.float32)
+        bounds = Mesh(points, thing.mesh.faces).bounds.astype(np.float32)
         shells_add_up = thing.closedness is not None and thing.closedness.state == "closed"
         first = sum(len(other.mesh.faces) for other in self.scene.objects[:index])
         return TracedObject(
