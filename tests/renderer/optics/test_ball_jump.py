@@ -9,7 +9,7 @@ from renderer.optics.ball_exit import ball_exit
 from renderer.optics.ball_jump import BINS, ball_jumps, table_radii
 from renderer.optics.free_flight import channel_probabilities, choose_channel, collision_weight, surface_weight
 from sss_tools.cache import FOLDER_VARIABLE
-from tests.assertions import assert_mean, seed, shared_rate
+from tests.assertions import assert_distribution, assert_mean, seed, shared_rate
 
 GREY = ([50.0] * 3, [0.99] * 3)
 COLOURED = ([50.0] * 3, [0.999, 0.99, 0.9])
@@ -164,3 +164,58 @@ def test_entries_do_not_depend_on_the_unit_of_length():
     assert_array_equal(coarse.weight, fine.weight)
     assert_allclose(coarse.radius, 1000 * fine.radius, rtol=1e-6)
     assert coarse._lower.shape == (17 * (BINS + 1),)
+
+
+def exits(k: int, n: int = 200_000):
+    """Jumps of the k-th radius from the origin: place on the unit sphere, cosine of leaving and its azimuth."""
+    jumps, draw = ball_jumps(*GREY), np.random.default_rng(seed(6))
+    position, direction = np.zeros((3, n), np.float32), np.empty((3, n), np.float32)
+    jumps.jump(np.full(n, k, np.int32), draw.random((4, n), dtype=np.float32), position, direction)
+    radial = position.astype(float) / jumps.radius[k]
+    cosine = np.einsum("ij,ij->j", radial, direction)
+    # azimuth about the radius, from the meridian
+    east = np.stack([-radial[1], radial[0], np.zeros(n)]) / np.maximum(np.hypot(*radial[:2]), 1e-12)
+    azimuth = np.arctan2(np.einsum("ij,ij->j", np.cross(radial, east, axis=0), direction),
+                         np.einsum("ij,ij->j", east, direction))  # fmt: skip
+    return radial, cosine, azimuth
+
+
+def check_exit_cosines(k: int, radius: float) -> None:
+    """Weight that leaves in each of 16 bins of the cosine, against the exact share; straight exits apart.
+
+    What is drawn is broader than that, so it is weight that is counted: from a stratified grid of 2^18, without noise.
+    """
+    jumps, n = ball_jumps(*COLOURED), 1 << 18
+    u = ((np.arange(n) + 0.5) / n).astype(np.float32)
+    cosine, weights = jumps.sample_exit(np.full(n, k, np.int32), u)
+    scattered, edges = u >= jumps._straight[k], np.linspace(0, 1, 17)
+    for channel, albedo in enumerate(COLOURED[1]):
+        ball = ball_exit(radius, [albedo])
+        found, _ = np.histogram(cosine[scattered], edges, weights=weights[channel][scattered].astype(float) / n)
+        # the table is cumulative in the angle
+        expected = -np.diff(np.interp(np.arccos(edges), ball.angle, ball.share[0]))
+        # within the flattest of 512 equally likely bins cosines are drawn evenly: 7e-4 of the light move by 0.05
+        assert_allclose(found, expected, rtol=0.01, atol=1e-3 * expected.sum())
+
+
+@pytest.mark.parametrize("k", [3, 10])
+def test_exit_cosines_follow_the_exact_density(k):
+    check_exit_cosines(k, float(table_radii()[k]))
+
+
+def test_exits_of_the_next_larger_ball_are_caught():
+    with pytest.raises(AssertionError, match="Not equal"):
+        check_exit_cosines(3, float(table_radii()[4]))
+
+
+def test_exits_are_even_over_the_sphere_and_about_the_radius():
+    """In height and longitude, and in azimuth. Sees 5 %."""
+    radial, cosine, azimuth = exits(10)
+    turns = np.linspace(-np.pi, np.pi, 13)
+    counts, *_ = np.histogram2d(
+        radial[2], np.arctan2(radial[1], radial[0]), (np.linspace(-1 - 1e-5, 1 + 1e-5, 13), turns)
+    )
+    assert_distribution(counts, np.ones((12, 12)), false_alarm=1e-4, detects=0.05)
+    # apart from those that leave along the radius
+    around, _ = np.histogram(azimuth[cosine < 0.999], turns)
+    assert_distribution(around, np.ones(12), false_alarm=1e-4, detects=0.05)

@@ -92,3 +92,36 @@ def test_directions_of_guided_and_plain_flights_together_have_the_stated_density
     for cosine in (-1.0, -0.2, 0.9, 1.0):
         expected = plain + GUIDE.share * density(cosine) / (2 * np.pi)
         assert GUIDE.density(np.float32([cosine]))[0] == pytest.approx(expected, rel=1e-5)
+
+
+def counted(share_claimed: float, flights: int = SAMPLES):
+    """Counts of free flights by cosine and length, and what the weights say they must be: plain density over weight.
+
+    A weight is the plain density over that of the mixture; so the mixture's is the plain one over the weight.
+    """
+    guide = Guide.of(0.8, 4.0, 0.6)
+    rng = np.random.default_rng(seed(5))
+    u, flight = rng.random(flights, np.float32), rng.standard_exponential(flights, np.float32)
+    guided = u < guide.share
+    rest = np.where(guided, u * guide.inverse_share, (u - guide.share) * guide.inverse_rest).astype(np.float32)
+    cosine = np.where(guided, guide.sample_cosine(rest), 2 * rest - 1)
+    flight /= np.where(guided, guide.rate(cosine), 1) * np.float32(guide.sigma_t)
+    bins, fine, longest = 12, 32, 1.0
+    counts, *_ = np.histogram2d(cosine, flight, bins, [[-1, 1], [0, longest]])
+    middles = (np.arange(bins * fine) + 0.5) / (bins * fine)
+    c, s = (np.float32(values).ravel() for values in np.meshgrid(2 * middles - 1, longest * middles, indexing="ij"))
+    weight = Guide.of(0.8, 4.0, share_claimed).weight(c.copy(), s, np.zeros(0, np.intp))
+    density = (np.exp(-guide.sigma_t * s.astype(float)) * guide.sigma_t / 2 / weight).reshape(bins, fine, bins, fine)
+    expected = density.mean(axis=(1, 3)) * 2 * longest / bins**2
+    beyond = max(1 - expected.sum(), 0)
+    return np.append(counts.ravel(), flights - counts.sum()), np.append(expected.ravel(), beyond)
+
+
+def test_flights_have_the_joint_density_that_their_weights_undo():
+    """Cosine and length together. Sees relative errors of 3 %."""
+    assert_distribution(*counted(0.6), false_alarm=1e-4, detects=0.03)
+
+
+def test_weights_of_another_mixture_are_caught():
+    with pytest.raises(AssertionError, match="wrong distribution"):
+        assert_distribution(*counted(0.55), false_alarm=1e-4, detects=0.03)
