@@ -15,7 +15,7 @@ from ..optics.guided_flight import Guide
 from .distance_grid import DistanceGrid, Walks, choose_resolution
 from .traced_scene import TracedObject, TracedScene
 
-_TYPICAL_PASSES, _TYPICAL_SHARE = 64, 0.3
+_TYPICAL_PASSES, _TYPICAL_SHARE = 16, 0.3
 """How often a picture is sampled, and the share of it that shows an object, where set-up must be weighed against
 time saved."""
 JUMP_ALBEDO, JUMP_INRADIUS = 0.97, 10.0

@@ -45,7 +45,7 @@ _HALF_DIAGONAL = np.sqrt(3) / 2
 _LARGEST_REGIONS = 16
 # seconds, measured on two cores: a bounded ray, a flight with its collision, a look-up; building
 _RAY, _COLLISION, _LOOKUP = 80e-9, 60e-9, 15e-9
-_START, _PER_VOXEL, _PER_SURFACE_VOXEL = 0.05, 1e-7, 6e-6
+_START, _PER_VOXEL, _PER_SURFACE_VOXEL = 0.05, 1e-7, 1.5e-5
 
 
 class Scratch:
