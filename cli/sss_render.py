@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import sys
 import time
 from collections.abc import Iterator, Sequence
@@ -22,6 +23,10 @@ if TYPE_CHECKING:
     from renderer.scene.description import Scene
 
 PROGRAM = "sss-render"
+
+# before NumPy is imported: all systems of equations here are small, and on a busy machine OpenBLAS's own threads wait
+# for each other ten times as long as they work
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 
 def main(argv: Sequence[str] | None = None) -> int:

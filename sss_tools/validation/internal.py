@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..interior import SOLID
 from .outcome import FixSafety, Severity
 from .rule import Finding, NotRun, Rule, Subject, plural
 
@@ -24,7 +25,7 @@ def find_internal_geometry(subject: Subject) -> Finding | None:
     overlapping = np.setdiff1d(assessment.component_of_face[single], accounted)
     found = []
     if nested:
-        found.append(f"{plural(len(nested), 'closed component')} inside a solid")
+        found.append(f"{plural(len(nested), 'component')} inside a solid")
     if apart:
         found.append(f"{plural(len(apart), 'patch', 'patches')} with solid on both sides")
     if len(overlapping):
@@ -33,7 +34,7 @@ def find_internal_geometry(subject: Subject) -> Finding | None:
         found.append(f"{plural(interior.skipped, 'smaller patch', 'smaller patches')} not looked at")
     return Finding(
         count=len(nested) + len(apart) + len(overlapping),
-        message=", ".join(found),
+        message=f"{', '.join(found)} (inside: wound round by more than {SOLID:g} of a turn; no length is tolerated)",
         faces=np.union1d(whole, single),
     )
 
@@ -48,7 +49,8 @@ def find_cavities(subject: Subject) -> Finding | None:
     known = sum(-volume for volume in volumes if volume is not None)
     return Finding(
         count=len(cavities),
-        message=f"{plural(len(cavities), 'void')} inside a solid, {known:.3g} cubic units in all",
+        message=f"{plural(len(cavities), 'void')} inside a solid, {known:.3g} cubic units in all "
+        f"(inside: wound round by more than {SOLID:g} of a turn)",
         faces=assessment.faces_of(cavities),
     )
 

@@ -103,12 +103,12 @@ CASES = {
     "SSS301": Case(
         shapes.joined(shapes.box(4.0), BALL),
         shapes.joined(shapes.box(4.0), shapes.moved(BALL, [3.1, 0, 0])),
-        ("1 closed component inside a solid",),
+        ("1 component inside a solid", "more than 0.5 of a turn"),
     ),
     "SSS302": Case(two(1, 0.25, 0.25), two(1 + 2.0**-52, 0.25, 0.25), ("pairs of faces", EXACT)),
     "SSS303": Case(box_with(BOX.faces[:1]), BOX, ("1 face", EXACT)),
     "SSS304": Case(BOX, BOX, ("overlaps or touches other", EXACT), beside(0.0), beside(2.0**-50)),
-    "SSS305": Case(shapes.hollow_ball(), BALL, ("1 void", "cubic units")),
+    "SSS305": Case(shapes.hollow_ball(), BALL, ("1 void", "cubic units", "more than 0.5 of a turn")),
     "SSS401": Case(shard(0.9e-9 * 4.6), shard(1.2e-9 * 4.6), ("without area", "units", "1e-09 of the diagonal")),
     "SSS402": Case(
         shapes.box([1, 1, 1 / 1100]), shapes.box([1, 1, 1 / 900]), ("more than 1000 times as long as high",)
