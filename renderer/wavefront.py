@@ -32,8 +32,8 @@ from .tracing.traced_scene import TracedScene
 Float32 = NDArray[np.float32]
 BLOCK = 131072
 """Paths in flight of a worker. Many, although they do not fit into the second-level cache: between NumPy's calls
-threads wait for each other. With 16 thousand a second thread brings next to nothing, with these 1.5 to 1.9 times the
-speed (``benchmarks/walks.py``)."""
+threads wait for each other. In a grey medium two threads bring 1.5 times the speed of one with 16 thousand, and 1.9 times
+with these; in dense ones, whose jumps work on small groups, 1.0 and 1.2 (``benchmarks/walks.py``)."""
 
 _REFILL_AT = 1 / 2
 NOTHING = np.int16(-1)
