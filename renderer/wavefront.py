@@ -32,7 +32,7 @@ from .tracing.traced_scene import TracedScene
 Float32 = NDArray[np.float32]
 BLOCK = 131072
 """Paths in flight of a worker. Many, although they do not fit into the second-level cache: between NumPy's calls
-threads wait for each other. In a grey medium two threads bring 1.5 times the speed of one with 16 thousand, and 1.9 times
+threads wait for each other. In a grey medium two threads bring 1.5 times the speed of one with 16 thousand, 1.9 times
 with these; in dense ones, whose jumps work on small groups, 1.0 and 1.2 (``benchmarks/walks.py``)."""
 
 _REFILL_AT = 1 / 2
