@@ -239,8 +239,6 @@ def _check_report(path: Path) -> None:
     """Refuse a report that cannot be written, before the hour of rendering."""
     if path.is_dir() or not path.parent.is_dir():
         raise InputError(path, "cannot be written: no such folder, or a folder itself", "name a file in a folder")
-    import os
-
     if not os.access(path if path.exists() else path.parent, os.W_OK):
         raise InputError(path, "cannot be written: write-protected", "choose another name")
 

@@ -174,13 +174,8 @@ class Wavefront:
     def _fly(self) -> None:
         """Take the paths outside all media to the surfaces they meet; add the background that the others see."""
         paths = self._flying
-        distance, triangle = self.scene.closest(paths.origin, paths.direction)
+        distance, triangle = self.scene.met(paths.origin, paths.direction)
         self._tally.rays += paths.count
-        for k, sphere in enumerate(self.scene.lights.spheres):
-            reach = sphere.distance(paths.origin, paths.direction)
-            nearer = reach < distance
-            np.copyto(distance, reach, where=nearer)
-            np.copyto(triangle, np.int32(-2 - k), where=nearer)
         escaped = np.flatnonzero(triangle == -1)
         lights = self.scene.lights
         density = paths.density[escaped] if lights.skies else None

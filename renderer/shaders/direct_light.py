@@ -37,7 +37,7 @@ def received(
     inside, owner  what that side is inside of, see ``Paths``
     """
     origin = offset_from(position, normal, np.ones(position.shape[1], np.float32))
-    return light.irradiance * transmittance(scene, scene.media, origin, light, inside, owner, tally)
+    return light.irradiance * transmittance(scene, origin, light, inside, owner, tally)
 
 
 def arriving(scene: TracedScene, position: Float32, draw, skies: bool = False) -> Iterator[Illumination]:

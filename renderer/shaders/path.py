@@ -101,7 +101,7 @@ class MediumWalk:
             np.copyto(paths.density, self._density(slice(None), turned), where=~paths.flies_on)
         np.copyto(paths.direction, turned, where=~paths.flies_on)
         if self._achromatic:
-            arrived, triangle = self._fly_achromatic(flight, bound)
+            arrived, triangle = self._travel(flight, self._sigma_t[0], bound)
         else:
             arrived, triangle = self._fly_chromatic(flight, bound)
         if weigh is not None:
@@ -187,57 +187,44 @@ class MediumWalk:
 
         return turned, weigh
 
-    def _fly_achromatic(self, flight: Float32, bound: Float32 | None):
-        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-            flight /= self._sigma_t[0]
-        np.copyto(flight, MISS, where=~(flight < MISS))
-        return self._travel(flight, bound)
-
     def _fly_chromatic(self, flight: Float32, bound: Float32 | None):
         """Draw the flight for one channel and weigh all by the balance heuristic."""
         paths = self.paths
         choice, _ = self._uniforms.draw(paths.stream)
         chances = channel_probabilities(paths.throughput, self._albedo)
-        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-            flight /= self._sigma_t[choose_channel(chances, choice), 0]
-        np.copyto(flight, MISS, where=~(flight < MISS))
-        arrived, triangle = self._travel(flight, bound)
+        arrived, triangle = self._travel(flight, self._sigma_t[choose_channel(chances, choice), 0], bound)
         reach = np.where(flight < MISS, flight, 0)
         factor = collision_weight(reach, self._sigma_s, self._sigma_t, chances)
         factor[:, arrived] = surface_weight(reach[arrived], self._sigma_t, chances[:, arrived])
         paths.throughput *= factor
         return arrived, triangle
 
-    def _travel(self, flight: Float32, bound: Float32 | None) -> tuple[NDArray[np.intp], NDArray[np.int32]]:
-        """Move the paths, shortening ``flight`` in place to where they meet a surface: which, and its triangle.
+    def _travel(
+        self, flight: Float32, sigma_t: Float32, bound: Float32 | None
+    ) -> tuple[NDArray[np.intp], NDArray[np.int32]]:
+        """Move the paths by ``flight`` (n,) mean free paths, or to the surface they meet before: which, and where.
 
-        Triangle -2 - k is the k-th sphere light.
+        ``flight`` becomes the distance moved, ``MISS`` for paths that would fly on for ever. Triangle -2 - k is the
+        k-th sphere light.
         """
         paths = self.paths
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+            flight /= sigma_t
+        np.copyto(flight, MISS, where=~(flight < MISS))
         if bound is None:
-            distance, triangle = self._closest(paths.origin, paths.direction, flight)
-            flight[:] = distance
+            flight[:], triangle = self.scene.met(paths.origin, paths.direction, flight)
+            self.tally.rays += paths.count
             arrived = (triangle != -1).nonzero()[0]
             triangle = triangle[arrived]
         else:
             near = (flight >= bound).nonzero()[0]
-            distance, triangle = self._closest(paths.origin[:, near], paths.direction[:, near], flight[near])
-            flight[near] = distance
+            flight[near], triangle = self.scene.met(paths.origin[:, near], paths.direction[:, near], flight[near])
+            self.tally.rays += len(near)
             hit = (triangle != -1).nonzero()[0]
             arrived, triangle = near[hit], triangle[hit]
         step = np.multiply(paths.direction, flight, out=self._turned[:, : paths.count])
         np.add(paths.origin, step, out=paths.origin)
         return arrived, triangle
-
-    def _closest(self, origin: Float32, direction: Float32, limit: Float32) -> tuple[Float32, NDArray[np.int32]]:
-        distance, triangle = self.scene.closest(origin, direction, limit)
-        self.tally.rays += len(limit)
-        for k, sphere in enumerate(self.scene.lights.spheres):
-            reach = sphere.distance(origin, direction)
-            nearer = reach < distance
-            np.copyto(distance, reach, where=nearer)
-            np.copyto(triangle, np.int32(-2 - k), where=nearer)
-        return distance, triangle
 
     def _lose_leaked(self, radiance: Float32) -> None:
         """End paths that collide outside their object's bounding box: they have slipped through its surface."""

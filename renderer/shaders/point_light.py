@@ -67,7 +67,7 @@ def light_collisions(
         u, _ = uniforms.draw_at(paths.stream, who)
         deepest = FREE_DEPTH + exponential(u, np.empty_like(u))
         visible = shadow_transmittance(
-            scene, media, position[:, some], light, paths.inside[:, who], paths.owner[who], tally, deepest
+            scene, position[:, some], light, paths.inside[:, who], paths.owner[who], tally, deepest
         )
         arrived = light.irradiance * (weight * visible / (ior * ior))
         radiance[:, paths.sample[who]] += paths.throughput[:, who] * arrived

@@ -101,7 +101,7 @@ def _follow(
         step = target - position
         way = np.sqrt(np.einsum("ij,ij->j", step, step))
         stretch = Illumination(-direction[k][:, left], way, np.ones((3, 1), np.float32))
-        share, inside, owner = follow(scene, media, position, stretch, inside, owner, tally)
+        share, inside, owner = follow(scene, position, stretch, inside, owner, tally)
         # the beam was bent from index 1 to the object's; where other objects have it otherwise, it is not there
         beyond_inside = inside.copy()
         beyond = cross(beyond_inside, scene.slot_of_triangle[surface], np.zeros(len(left), bool))
@@ -114,5 +114,5 @@ def _follow(
         if not len(left):
             return result
     light = beams.source.illuminate(position)
-    result[:, left] = passed * transmittance(scene, media, position, light, inside, owner, tally)
+    result[:, left] = passed * transmittance(scene, position, light, inside, owner, tally)
     return result

@@ -22,7 +22,6 @@ FREE_DEPTH = np.float32(1)
 
 def transmittance(
     scene: TracedScene,
-    media: MediaTable,
     position: Float32,
     light: Illumination,
     inside: NDArray[np.int8],
@@ -40,12 +39,11 @@ def transmittance(
              stay short: ``FREE_DEPTH`` plus an exponential variate. Light from deeper then stands for all that would be
              given up, and the mean is the same
     """
-    return follow(scene, media, position, light, inside, owner, tally, deepest)[0]
+    return follow(scene, position, light, inside, owner, tally, deepest)[0]
 
 
 def follow(
     scene: TracedScene,
-    media: MediaTable,
     position: Float32,
     light: Illumination,
     inside: NDArray[np.int8],
@@ -54,6 +52,7 @@ def follow(
     deepest: Float32 | None = None,
 ) -> tuple[Float32, NDArray[np.int8], NDArray[np.int16]]:
     """``transmittance``, and ``inside`` and ``owner`` at the light's end, which mean nothing where it is 0."""
+    media = scene.media
     limit = None if deepest is None else _limit(media, owner, deepest)
     n = position.shape[1]
     result = np.zeros((3, n), np.float32)

@@ -176,6 +176,18 @@ class TracedScene:
         """As ``RayCaster.closest``."""
         return self.caster.closest(origin, direction, limit)
 
+    def met(
+        self, origin: Float32, direction: Float32, limit: Float32 | None = None
+    ) -> tuple[Float32, NDArray[np.int32]]:
+        """As ``closest``, sphere lights included: triangle -2 - k is the k-th of them."""
+        distance, triangle = self.closest(origin, direction, limit)
+        for k, sphere in enumerate(self.lights.spheres):
+            reach = sphere.distance(origin, direction)
+            nearer = reach < distance
+            np.copyto(distance, reach, where=nearer)
+            np.copyto(triangle, np.int32(-2 - k), where=nearer)
+        return distance, triangle
+
     def on_plane(self, position: Float32, triangle: NDArray[np.int32]) -> Float32:
         """(3, n) hit points moved back onto their triangle's plane.
 

@@ -31,7 +31,7 @@ def through(world: TracedScene, start, end, inside=None, deepest=None):
         counts[:, 0] = inside
     within = counts[:, 0] > 0
     owner = np.int16([within.argmax() if within.any() else OUTSIDE])
-    return transmittance(world, world.media, start, light, counts, owner, Tally(), deepest)[:, 0]
+    return transmittance(world, start, light, counts, owner, Tally(), deepest)[:, 0]
 
 
 def attenuation(length: float):
@@ -105,7 +105,7 @@ def test_beams_agree_with_all_crossings_tried():
     assert set(inside) == {0, 1}
     distance = np.full(400, 3, np.float32)
     light = Illumination(((end - start) / 3).astype(np.float32), distance, np.ones((3, 1), np.float32))
-    got = transmittance(world, world.media, start.astype(np.float32), light, inside[None].astype(np.int8),
+    got = transmittance(world, start.astype(np.float32), light, inside[None].astype(np.int8),
                         np.where(inside, 0, -1).astype(np.int16), Tally())  # fmt: skip
     expected = np.exp(-np.array(lengths) * world.media.sigma_t[:, :1])
     # a few offsets of 1e-6, over the cosine of glancing beams, times sigma_t of 4.6
@@ -143,12 +143,12 @@ def test_beams_are_independent_of_their_neighbours():
     distance = np.linalg.norm(end - start, axis=0).astype(np.float32)
     light = Illumination((end - start) / distance, distance, np.ones((3, 1), np.float32))
     outside = np.zeros((3, n), np.int8), np.full(n, OUTSIDE)
-    together = transmittance(world, world.media, start, light, *outside, Tally())
+    together = transmittance(world, start, light, *outside, Tally())
     assert len(np.unique(together[0].round(3))) > 10
     for k in range(n):
         only = slice(k, k + 1)
         beam = Illumination(light.direction[:, only], distance[only], light.irradiance)
-        alone = transmittance(world, world.media, start[:, only], beam, *(part[..., only] for part in outside), Tally())
+        alone = transmittance(world, start[:, only], beam, *(part[..., only] for part in outside), Tally())
         assert_array_equal(alone[:, 0], together[:, k])
     assert not outside[0].any()  # the caller's counts are not changed
 
