@@ -13,8 +13,7 @@ def keep_freed_memory() -> None:
     """Tell glibc to keep up to 256 MB that are freed instead of giving them back page by page.
 
     By default arrays above 128 kB are mapped afresh each time, and clearing their pages makes threads wait for
-    each other: a plumb frame of the bunny takes 0.70 s with the default and 0.49 s so (two cores). Does nothing where
-    there is no glibc.
+    each other. Does nothing where there is no glibc.
     """
     if not sys.platform.startswith("linux"):
         return
