@@ -23,8 +23,9 @@ JUMP_ALBEDO, JUMP_INRADIUS = 0.97, 10.0
 LEAST_GUIDE_ALBEDO = 0.2
 """Below, the guide's nu0 = 1 + 2 exp(-2 / albedo) is 1 in float32: 4e-9 above it at 0.1."""
 GUIDE_ALBEDO, STRONG_GUIDE_ALBEDO, STRONG_GUIDE_SIZE = 0.995, 0.98, 16.0
-"""Guided flights save most where the albedo is low, and nothing at 0.998. Three of four flights are guided, and not two, where no light that goes deep (bodies of many mean free paths) comes back (albedo), and where no
-lamp makes some of what comes out brighter than the rest."""
+"""Guided flights save most at low albedo, and nothing at 0.998. Three of four flights are guided, and not two,
+where no light that goes deep (bodies of many mean free paths) comes back (albedo), and where no lamp makes some of what
+comes out brighter than the rest."""
 
 
 @dataclass(frozen=True)
