@@ -218,6 +218,19 @@ def test_the_bias_of_lights_without_extent_is_named_where_there_is_one():
         assert method["known_bias"] == "none"
 
 
+def test_light_through_one_smooth_body_into_another_is_named_as_missing():
+    near = placed(shapes.icosphere(1.0, 1), translucent(), name="near")
+    for material, missing in (
+        (translucent(), True),
+        (translucent(ior=1.0), False),
+        (translucent(roughness=0.3), False),
+    ):
+        far = placed(shapes.moved(shapes.icosphere(1.0, 1), (3, 0, 0)), material, name="far")
+        renderer = Renderer(scene([near, far], (SUN,), camera((0, 0.5, 9))), Settings(shader="path"))
+        said = light_methods(renderer)[0]["known_bias"]
+        assert ("another body" in said) == missing
+
+
 def test_lights_with_an_extent_are_sampled_where_the_boundary_lets_them_through():
     lamp = RectangleLight(np.array([0.0, 3, 0]), np.zeros(3), np.array([1.0, 0, 0]), (1, 1), np.ones(3))
     sun = np.zeros((8, 16, 3), np.float32)
