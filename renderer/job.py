@@ -333,8 +333,8 @@ def _through_facets(renderer: Renderer, thing: SceneObject) -> tuple[str, str]:
     slot = [one.index for one in traced.translucent].index(index)
     if traced.holds_light[:, slot].any():
         bias += "; of a light inside, all that the boundary reflects before its first collision"
-    bending = [one for one in traced.translucent if one.medium is not None and one.medium.ior != 1 and not one.roughness]
-    if len(bending) > 1:
+    media = [(one.medium, one.roughness) for one in traced.translucent]
+    if sum(medium is not None and medium.ior != 1 and roughness == 0 for medium, roughness in media) > 1:
         bias += "; nor light that comes through another body with a smooth boundary"
     return method, bias
 
