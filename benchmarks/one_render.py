@@ -25,6 +25,8 @@ from cli.clock import process_start
 
 LANES = (2**15, 2**20)
 """Samples of one call of Mitsuba: enough to keep wide kernels busy, not more than fit in memory."""
+LEAST = 8
+"""Passes of ours, whatever the time: of fewer the variance is too uncertain."""
 CALLS = 16
 """Calls of Mitsuba that should fit in the time: the variance is estimated from their means."""
 
@@ -52,7 +54,7 @@ def _peak_memory() -> int:
 
 
 def ours(options: argparse.Namespace) -> dict:
-    """The path shader, all passes in one run as the command does it."""
+    """The path shader, all passes in one run as the command does it, at least ``LEAST`` of them."""
     started = process_start()
     from renderer.render import Renderer, Settings
     from renderer.scene.scene_file import load_scene
@@ -64,10 +66,13 @@ def ours(options: argparse.Namespace) -> dict:
     def done(_: int) -> bool:
         nonlocal ended
         ended = time.time()
-        return ended - begun > options.seconds and renderer.film.passes >= 8
+        return ended - begun > options.seconds and renderer.film.passes >= LEAST
 
-    # as for --time: fewer passes at once towards the end, for what is under way then is lost
-    renderer.run(count(), done, lambda: begun + options.seconds - time.time())
+    def seconds_left() -> float:
+        # as for --time: fewer passes at once towards the end, for what is under way then is lost
+        return begun + options.seconds - time.time() if renderer.film.passes >= LEAST else 1e6
+
+    renderer.run(count(), done, seconds_left)
     film = renderer.film
     return {
         "mean": film.mean(),
