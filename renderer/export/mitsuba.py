@@ -34,7 +34,7 @@ from ..scene.description import (
     SphereLight,
     Translucent,
 )
-from ..tracing.traced_scene import corner_normals
+from ..tracing.normals import corner_normals
 
 ROULETTE_DEPTH = 1000
 """Bounces before Mitsuba plays roulette. Its weights grow from then on, which makes dense media noisy."""

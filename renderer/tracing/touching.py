@@ -13,7 +13,10 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from sss_tools.mesh import Mesh
 from sss_tools.rays import RAY_OFFSET
+
+from .normals import point_normals
 
 Float64 = NDArray[np.float64]
 
@@ -57,27 +60,8 @@ def _mark(moves: NDArray[np.bool_], points: Float64, other: Float64, faces: NDAr
 
 def _grown(points: Float64, faces: NDArray, moves: NDArray[np.bool_]) -> Float64:
     """Marked vertices, and those in the same places, moved along the mean normal of the faces around."""
-    place, count = _places(points)
-    corners = points[faces]
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    length = np.linalg.norm(normals, axis=1, keepdims=True)
-    normals = np.divide(normals, length, out=np.zeros_like(normals), where=length > 0)
-    total = np.zeros((count, 3))
-    for k in range(3):
-        a, b = corners[:, (k + 1) % 3] - corners[:, k], corners[:, (k + 2) % 3] - corners[:, k]
-        # by angle, so that it does not matter how sides are cut into triangles
-        angle = np.arctan2(np.linalg.norm(np.cross(a, b), axis=1), (a * b).sum(axis=1))
-        for axis in range(3):
-            total[:, axis] += np.bincount(place[faces[:, k]], angle * normals[:, axis], count)
-    length = np.linalg.norm(total, axis=1, keepdims=True)
-    total = np.divide(total, length, out=np.zeros_like(total), where=length > 0)
-    marked = np.zeros(count, bool)
+    mesh = Mesh(points, faces)
+    normals, place = point_normals(mesh), mesh.topology.point_of_vertex
+    marked = np.zeros(len(normals), bool)
     marked[place[moves]] = True
-    return points + GROWTH * (total * marked[:, None])[place]
-
-
-def _places(points: Float64) -> tuple[NDArray[np.intp], int]:
-    from sss_tools.topology import weld_exactly
-
-    place, welded = weld_exactly(points)
-    return place, len(welded)
+    return points + GROWTH * (normals * marked[:, None])[place]

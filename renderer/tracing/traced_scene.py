@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -16,6 +15,7 @@ from ..scene.description import Scene, SceneObject, Translucent
 from ..scene.lights import LightSet, PointSource
 from .beam_generation import Facets
 from .media import MediaTable
+from .normals import SmoothNormals
 from .refracted_beams import RefractedBeams
 from .touching import grown_where_touching
 from .unscattered import mirror_as_needed
@@ -219,49 +219,6 @@ class TracedScene:
     def occluded(self, origin: Float32, direction: Float32, limit: Float32 | None = None) -> NDArray[np.bool_]:
         """As ``RayCaster.occluded``."""
         return self.caster.occluded(origin, direction, limit)
-
-
-class SmoothNormals:
-    """Normals at the corners of triangles, interpolated on objects with ``normals = "smooth"``."""
-
-    def __init__(self, objects: Sequence[SceneObject], triangle_count: int):
-        self._corners = np.zeros((triangle_count, 3, 3), np.float32)
-        self._applies = np.zeros(triangle_count, bool)
-        first = 0
-        for thing in objects:
-            last = first + len(thing.mesh.faces)
-            if thing.normals == "smooth":
-                self._corners[first:last] = corner_normals(thing.mesh)
-                self._applies[first:last] = True
-            first = last
-
-    def interpolate(self, weights: Float32, triangle: NDArray[np.int32], flat: Float32) -> Float32:
-        """(3, n) unit normals at barycentric ``weights`` (3, n); ``flat`` (3, n) where the object is not smooth."""
-        mixed = np.einsum("ki,ikj->ji", weights, self._corners[triangle])
-        length = np.sqrt(np.einsum("ij,ij->j", mixed, mixed))
-        usable = np.take(self._applies, triangle) & (length > 1e-6)
-        return np.where(usable, mixed / np.maximum(length, np.float32(1e-6)), flat)
-
-
-def corner_normals(mesh: Mesh) -> Float32:
-    """(m, 3, 3) unit vertex normals at the three corners of each face.
-
-    The mean of the normals of the faces around, weighted by the corner's angle (Thuermer & Wuthrich 1998, JGT
-    3(1)), over exactly coincident vertices, so that UV seams do not show.
-    """
-    topology = mesh.topology
-    corners = mesh.vertices[mesh.faces]
-    total = np.zeros_like(topology.points)
-    for k in range(3):
-        a, b = corners[:, (k + 1) % 3] - corners[:, k], corners[:, (k + 2) % 3] - corners[:, k]
-        lengths = np.linalg.norm(a, axis=1) * np.linalg.norm(b, axis=1)
-        cosine = np.einsum("ij,ij->i", a, b) / np.where(lengths > 0, lengths, 1)
-        angle = np.arccos(np.clip(cosine, -1, 1))
-        for axis in range(3):
-            total[:, axis] += np.bincount(topology.faces[:, k], angle * mesh.face_normals[:, axis], len(total))
-    length = np.linalg.norm(total, axis=1, keepdims=True)
-    unit = np.divide(total, length, out=np.zeros_like(total), where=length > 0)
-    return unit[topology.faces].astype(np.float32)
 
 
 def offset_from(position: Float32, normal: Float32, side: Float32) -> Float32:

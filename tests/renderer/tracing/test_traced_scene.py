@@ -5,8 +5,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from renderer.scene.description import RectangleLight
-from renderer.tracing.traced_scene import TracedScene, corner_normals, offset_from
-from sss_tools.mesh import Mesh
+from renderer.tracing.traced_scene import TracedScene, offset_from
 from sss_tools.rays import RAY_OFFSET
 from sss_tools.shapes import box, icosphere, moved
 from tests.renderer.scenes import WHITE_SKY, camera, diffuse, mirror, placed, scene, translucent
@@ -133,19 +132,6 @@ def test_smooth_normals_of_a_ball_point_from_its_centre():
     # facets are 8 degrees wide; interpolation leaves a tenth of a degree
     assert cosine.min() > np.cos(np.radians(0.3))
     assert flat.min() < np.cos(np.radians(3))
-
-
-def test_seams_do_not_show_in_smooth_normals():
-    """A box whose every face has vertices of its own: its corners' normals are still the diagonals."""
-    cube = box(2)
-    torn = Mesh(cube.vertices[cube.faces].reshape(-1, 3), np.arange(36).reshape(-1, 3))
-    expected = torn.vertices[torn.faces] / np.sqrt(3)
-    assert_allclose(corner_normals(torn), expected, atol=1e-6)
-
-
-def test_normals_are_weighted_by_the_corners_angle():
-    """A side of a cube is cut in two at some corners: weights by area or count would tilt the normals there."""
-    assert_allclose(corner_normals(box(1)), box(1).vertices[box(1).faces] * 2 / np.sqrt(3), atol=1e-6)
 
 
 def test_offset_goes_to_the_side_that_is_asked_for():
