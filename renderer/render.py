@@ -17,6 +17,7 @@ from queue import Empty, SimpleQueue
 import numpy as np
 from numpy.typing import NDArray
 
+from . import direct
 from .output.film import Film
 from .output.image import Picture
 from .scene.admission import admit
@@ -105,11 +106,14 @@ class Renderer:
             self._fast_bodies = _fast_bodies(self.traced)
             width, height = scene.camera.resolution
             self.acceleration = Acceleration.chosen(self.traced, width * height)
+            self._frames = None
+            if direct.applies_to(self.traced, self._fast_bodies):
+                self._frames = direct.Frames(self.traced, self.camera, self._fast_bodies, settings.seed)
             self.shader_id, self.object_id = self._identify()
         self.film = Film.blank(scene.camera.resolution, planned_hash(scene, self.plans), settings.seed)
         self.added = 0
         # their buffers outlive the threads of one ``run``
-        self._idle: SimpleQueue[Wavefront] = SimpleQueue()
+        self._idle: SimpleQueue[Wavefront | direct.DirectTracer] = SimpleQueue()
 
     def run(
         self,
@@ -214,18 +218,23 @@ class Renderer:
         stopped: threading.Event,
     ) -> Samples:
         try:
-            wavefront = self._idle.get_nowait()
+            tracer = self._idle.get_nowait()
         except Empty:
-            wavefront = Wavefront(
-                self.traced, self.camera, self._fast_bodies, self.settings.seed, acceleration=self.acceleration
-            )
+            tracer = self._tracer()
         try:
             start = time.perf_counter()
-            samples = wavefront.trace(first_pass, first, last, passes, chosen, stopped.is_set)
+            samples = tracer.trace(first_pass, first, last, passes, chosen, stopped.is_set)
             samples.seconds = time.perf_counter() - start
             return samples
         finally:
-            self._idle.put(wavefront)
+            self._idle.put(tracer)
+
+    def _tracer(self) -> Wavefront | direct.DirectTracer:
+        if self._frames is not None:
+            return direct.DirectTracer(self._frames)
+        return Wavefront(
+            self.traced, self.camera, self._fast_bodies, self.settings.seed, acceleration=self.acceleration
+        )
 
     def _add(self, units: list[Samples], k: int, index: int, chosen: NDArray[np.bool_] | None) -> None:
         """Add the k-th pass of the units, samples of the ``chosen`` pixels, to the film, as pass ``index``."""

@@ -89,6 +89,15 @@ class RayCaster:
         hits = self._scene.run(origin.T, direction.T, reach, output=1)
         return hits["tfar"], hits["primID"]
 
+    def closest_with_place(self, origin: Float32, direction: Float32):
+        """As ``closest`` without limit, and where on its triangle each ray ends.
+
+        Returns distance and triangle, and the weights (n,) float32 of the triangle's second and third corner; the
+        first one's is what they leave of 1.
+        """
+        hits = self._scene.run(origin.T, direction.T, None, output=1)
+        return hits["tfar"], hits["primID"], hits["u"], hits["v"]
+
     def occluded(self, origin: Float32, direction: Float32, limit: Float32 | None = None) -> NDArray[np.bool_]:
         """(n,) whether anything lies within ``limit`` along each ray."""
         reach = None if limit is None else np.array(limit, np.float32)

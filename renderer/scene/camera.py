@@ -38,6 +38,7 @@ class CameraRays:
         tangent = math.tan(math.radians(camera.fov) / 2)
         self._pixel = 2 * tangent / height
         # the formula above, sorted by powers of column + a and row + b, and rounded once
+        self._axes, self._reach = np.stack([left, upward, forward]), (tangent * (width / height), tangent)
         corner = forward + tangent * (width / height) * left + tangent * upward
         self._corner, self._per_column, self._per_row = (
             vector.astype(np.float32) for vector in (corner, -self._pixel * left, -self._pixel * upward)
@@ -72,6 +73,19 @@ class CameraRays:
         width, height = self.resolution
         pixel = np.arange(width * height, dtype=np.int32)
         return self.directions(pixel, np.full((2, len(pixel)), 0.5, np.float32))
+
+    def view(self, points: NDArray[np.floating]) -> NDArray[np.float64]:
+        """(3, n) coordinates of points (n, 3) in the frame: to the left, up, and along the line of sight."""
+        return self._axes @ (np.asarray(points, float) - self.origin).T
+
+    def place(self, seen: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(2, n) where points (3, n) of ``view`` are in the picture, in pixels from its left and from its top."""
+        left, up, depth = seen
+        return np.stack([(self._reach[0] - left / depth) / self._pixel, (self._reach[1] - up / depth) / self._pixel])
+
+    def unplace(self) -> NDArray[np.float64]:
+        """(3, 3) takes (column, row, 1) of a place in the picture to a direction as ``view`` has it."""
+        return np.array([[-self._pixel, 0, self._reach[0]], [0, -self._pixel, self._reach[1]], [0, 0, 1]])
 
     def pixel_footprint(self, distance):
         """Side of the square that a pixel covers at ``distance`` along the line of sight, in distance's unit.

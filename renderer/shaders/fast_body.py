@@ -63,7 +63,7 @@ class FastBody:
         facing, normal = geometric * side, scene.shading_normal(position, triangle) * side
         view_cosine = np.clip(-np.einsum("ij,ij->j", direction, normal), np.float32(1e-4), 1)
         points = SurfacePoints(position, normal, self._curvature_at(scene, position, triangle))
-        exitance = self._exitance(scene, points, paths.throughput[:, index], beams)
+        exitance = self.exitance(scene, points, paths.throughput[:, index].max(axis=0), beams)
         leaving = outgoing_radiance(exitance, view_cosine, self.optics.ior)
         radiance[:, paths.sample[index]] += paths.throughput[:, index] * leaving
         assert self.thing.medium is not None
@@ -78,14 +78,14 @@ class FastBody:
         else:
             self._reflect_rough(scene, paths, index, position, normal, facing, eta, uniforms, tally, radiance)
 
-    def _exitance(
+    def exitance(
         self, scene: TracedScene, points: SurfacePoints, throughput: Float32, beams: Sequence[Beam]
     ) -> Float32:
-        """(3, n) exitance, by the faster scalar shader where little of it reaches the camera."""
-        faint = throughput.max(axis=0) < FAINT
+        """(3, n) exitance, by the faster scalar shader where little of it reaches the camera: ``throughput`` (n,)."""
+        faint = throughput < FAINT
         if self.shader is not plumb or not faint.any():
             return self.shader.exitance(scene, points, self.optics, beams)
-        result = np.empty_like(throughput)
+        result = np.empty((3, len(points)), np.float32)
         for columns, shader in ((np.flatnonzero(faint), scalar), (np.flatnonzero(~faint), plumb)):
             result[:, columns] = shader.exitance(scene, points.take(columns), self.optics, beams)
         return result

@@ -217,8 +217,13 @@ def outgoing_radiance(exitance: Float32, cos_view: Float32, ior: float) -> Float
     """
     reflectance, _ = fresnel_reflectance(cos_view, ior)
     shape = 1 - reflectance
-    shape *= 1 / (np.pi * (1 - diffuse_external_reflectance(float(ior))))
+    shape *= exit_share(ior)
     return exitance * shape
+
+
+def exit_share(ior: float) -> float:
+    """1/(pi (1 - Fe)), per steradian; see ``outgoing_radiance``."""
+    return 1 / (np.pi * (1 - diffuse_external_reflectance(float(ior))))
 
 
 def sum_in_blocks(

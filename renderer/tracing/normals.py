@@ -28,6 +28,10 @@ class SmoothNormals:
                 self._applies[first:last] = True
             first = last
 
+    def corners(self, flat: Float32) -> Float32:
+        """(t, 3, 3) normals at the corners of all triangles; ``flat`` (t, 3, 3) on objects that are not smooth."""
+        return np.where(self._applies[:, None, None], self._corners, flat)
+
     def interpolate(self, weights: Float32, triangle: NDArray[np.int32], flat: Float32) -> Float32:
         """(3, n) unit normals at barycentric ``weights`` (3, n); ``flat`` (3, n) where the object is not smooth."""
         mixed = np.einsum("ki,ikj->ji", weights, self._corners[triangle])

@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 from .paths import Paths
 from .streams import Uniforms
 
-_FREE_SURFACES, _MANY_SURFACES = 3, 256
-_LASTING = np.float32(0.9)
+FREE_SURFACES, MANY_SURFACES = 3, 256
+LASTING = np.float32(0.9)
 
 
 def play_at_collisions(paths: Paths, uniforms: Uniforms) -> None:
@@ -25,12 +25,12 @@ def play_at_surfaces(paths: Paths, uniforms: Uniforms) -> None:
     Light that 256 surfaces keep inside a clear body without a collision would circle for ever: it goes on with
     probability 0.9 a time.
     """
-    index = np.flatnonzero(paths.surfaces > _FREE_SURFACES)
+    index = np.flatnonzero(paths.surfaces > FREE_SURFACES)
     if not len(index):
         return
     largest, faint = np.maximum.reduce(paths.throughput[:, index], axis=0), paths.faint[index]
     chance = np.where(largest < faint, largest / (2 * np.maximum(faint, np.float32(1e-30))), 1)
-    np.minimum(chance, _LASTING, out=chance, where=paths.surfaces[index] > _MANY_SURFACES)
+    np.minimum(chance, LASTING, out=chance, where=paths.surfaces[index] > MANY_SURFACES)
     endangered = chance < 1
     _survive(paths, uniforms, index[endangered], chance[endangered])
 

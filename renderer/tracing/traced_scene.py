@@ -205,6 +205,11 @@ class TracedScene:
             return normal
         return self._smooth.interpolate(self.barycentric(position, triangle), triangle, normal)
 
+    def corner_normals(self) -> Float32:
+        """(t, 3, 3) what ``shading_normal`` interpolates: unit normals at the corners of each triangle."""
+        flat = np.broadcast_to(self.triangle_normal.T[:, None], (len(self.triangles), 3, 3))
+        return flat if self._smooth is None else self._smooth.corners(flat)
+
     def barycentric(self, position: Float32, triangle: NDArray[np.int32]) -> Float32:
         """(3, n) weights of the triangles' corners at points on them, each in [0, 1]."""
         first, second = (np.take(edge, triangle, axis=1) for edge in self._edges)

@@ -44,6 +44,11 @@ class LightSet:
         """Whether there are lights that are found by drawing points on them as well as by chance."""
         return bool(self.rectangles or self.spheres or self.skies)
 
+    @property
+    def even(self) -> bool:
+        """Whether the background is the same in all directions."""
+        return all(environment.constant is not None for environment in self.environments)
+
     def background(self, direction: Float32, density: Float32 | None = None) -> Float32:
         """(3, n) radiance that rays meet when they leave the scene along ``direction``.
 

@@ -1,0 +1,328 @@
+"""Frames in which every object is lit by a fast shader behind a smooth boundary: traced without the wavefront.
+
+Paths neither branch nor walk there. What a camera ray meets is lit by one call and sends on one reflection, so
+blocks of rays go from reflection to reflection in step, and need little more than an origin, a direction and a
+number. The picture is the wavefront's, which takes all other scenes, to rounding; it takes half its time.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, fields, replace
+from typing import Self, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sss_tools.rays import RAY_OFFSET
+
+from .optics.dielectric import fresnel_reflectance
+from .scene.beams import beams
+from .scene.camera import CameraRays
+from .scene.coverage import covered_pixels
+from .shaders.fast_body import FastBody
+from .shaders.surface import SurfacePoints, exit_share
+from .tracing.paths import ROULETTE_BELOW
+from .tracing.roulette import FREE_SURFACES, LASTING, MANY_SURFACES
+from .tracing.streams import Uniforms, stream_keys
+from .tracing.tally import Tally
+from .tracing.traced_scene import TracedScene
+from .wavefront import NOTHING, Samples, Stopped
+
+Float32 = NDArray[np.float32]
+
+BLOCK = 16384
+"""Rays in step: their arrays stay in the second-level cache."""
+
+
+class _Columns:
+    """Arrays with a column a ray."""
+
+    def take(self, columns: NDArray[np.intp] | slice) -> Self:
+        """Those at ``columns``."""
+        return type(self)(*(value[..., columns] if isinstance(columns, slice) else value.take(columns, axis=-1)
+                            for value in vars(self).values()))  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Rays(_Columns):
+    """Rays of one generation.
+
+    origin, direction  (3, n) float32
+    throughput         (n,) float32: radiance found next, times this, reaches the camera
+    stream             (n,) uint64 state of the random numbers
+    sample             (n,) where the radiance adds up
+    """
+
+    origin: Float32
+    direction: Float32
+    throughput: Float32
+    stream: NDArray[np.uint64]
+    sample: NDArray[np.intp]
+
+    def __len__(self) -> int:
+        return len(self.throughput)
+
+
+@dataclass(frozen=True)
+class Meeting(Rays):
+    """Rays that meet triangles of objects.
+
+    distance  (n,) float32 until there
+    triangle  (n,) int32
+    u, v      (n,) float32 weights of its second and third corner where it is met
+    """
+
+    distance: Float32
+    triangle: NDArray[np.int32]
+    u: Float32
+    v: Float32
+
+
+@dataclass(frozen=True)
+class Met(_Columns):
+    """Points where rays meet objects.
+
+    position, facing, normal  (3, n) float32: on the triangle, its normal on the ray's side, the shading normal there
+    cosine                    (n,) float32 between ray and shading normal, above 0
+    curvature                 (n,) float32 mean curvature
+    """
+
+    position: Float32
+    facing: Float32
+    normal: Float32
+    cosine: Float32
+    curvature: Float32
+
+
+Group = TypeVar("Group", Rays, Meeting)
+
+
+class FaceTable:
+    """What is looked up of a triangle, side by side in one row: its plane, and normal and curvature at its corners.
+
+    rows  (t, 16) float32: normal and curvature of each corner, normal of the triangle, its plane's distance
+    """
+
+    def __init__(self, scene: TracedScene, bodies: Mapping[int, FastBody]):
+        count = len(scene.triangle_plane)
+        self.rows = np.zeros((count, 16), np.float32)
+        corners = self.rows[:, :12].reshape(count, 3, 4)
+        corners[:, :, :3] = scene.corner_normals()
+        for body in bodies.values():
+            if body.curvature is not None:
+                first = body.thing.first_triangle
+                corners[first : first + len(body.curvature), :, 3] = body.curvature
+        self.rows[:, 12:15] = scene.triangle_normal.T
+        self.rows[:, 15] = scene.triangle_plane
+
+    def at(self, rays: Meeting) -> Met:
+        """The points where they do."""
+        columns = np.ascontiguousarray(self.rows.take(rays.triangle, axis=0).T)
+        flat, plane = columns[12:15], columns[15]
+        position = rays.direction * rays.distance
+        position += rays.origin
+        # back onto the plane, see ``TracedScene.on_plane``
+        height = _dot(flat, position)
+        height -= plane
+        position -= height * flat
+        mixed = columns[0:4]
+        mixed *= 1 - rays.u - rays.v
+        mixed += rays.u * columns[4:8]
+        mixed += rays.v * columns[8:12]
+        normal = mixed[:3]
+        length = np.sqrt(_dot(normal, normal))
+        nothing = np.flatnonzero(length < np.float32(1e-6))
+        if len(nothing):
+            normal[:, nothing], length[nothing] = flat[:, nothing], 1
+        side = np.copysign(np.float32(1), -_dot(rays.direction, flat))
+        normal *= side / length
+        flat *= side
+        cosine = np.clip(-_dot(rays.direction, normal), np.float32(1e-4), 1)
+        return Met(position, flat, normal, cosine, mixed[3])
+
+
+def applies_to(scene: TracedScene, bodies: Mapping[int, FastBody]) -> bool:
+    """Whether all objects are lit by fast shaders, and none has a rough boundary."""
+    return len(bodies) == len(scene.objects) and all(
+        body.thing.roughness == 0 or body.optics.ior == 1 for body in bodies.values()
+    )
+
+
+class Frames:
+    """What is the same in all frames of a scene; threads share it."""
+
+    def __init__(self, scene: TracedScene, camera: CameraRays, bodies: Mapping[int, FastBody], seed: int):
+        self.scene, self.camera, self.bodies, self.seed = scene, camera, bodies, seed
+        self.table = FaceTable(scene, bodies)
+        width, height = camera.resolution
+        self.covered = np.ones(width * height, bool)
+        if not scene.lights.spheres:
+            self.covered = covered_pixels(camera, scene.vertices, scene.triangles)
+
+
+class DirectTracer:
+    """Traces camera samples as ``Wavefront`` does; one instance a thread."""
+
+    def __init__(self, frames: Frames):
+        self._frames = frames
+        self._uniforms = Uniforms(BLOCK)
+
+    def trace(
+        self,
+        first_pass: int,
+        first_pixel: int,
+        last_pixel: int,
+        passes: int = 1,
+        chosen: NDArray[np.int64] | None = None,
+        stopped: Callable[[], bool] | None = None,
+    ) -> Samples:
+        """As ``Wavefront.trace``, one pass at a time."""
+        if passes > 1:
+            raise ValueError("fast shaders take one pass at a time")
+        count = last_pixel - first_pixel
+        pixels = np.arange(first_pixel, last_pixel) if chosen is None else chosen[first_pixel:last_pixel]
+        frame = _Frame(self._frames, self._uniforms, first_pass, pixels)
+        surfaces = 0
+        meeting = [frame.from_camera(sample) for sample in _parts(np.flatnonzero(self._frames.covered[pixels]))]
+        while meeting:
+            surfaces += 1
+            reflected = []
+            for part in _blocks(meeting):
+                if stopped is not None and stopped():
+                    raise Stopped
+                reflected.append(frame.roulette(frame.light(part), surfaces))
+            meeting = [frame.cast(part) for part in _blocks(reflected)]
+        frame.see_nothing(np.flatnonzero(~self._frames.covered[pixels]))
+        tally = Tally()
+        tally.rays, tally.samples = frame.rays, count
+        return Samples(frame.radiance, frame.first_object, 1, tally)
+
+
+def _parts(columns: NDArray[np.intp]) -> list[NDArray[np.intp]]:
+    return [columns[start : start + BLOCK] for start in range(0, len(columns), BLOCK)]
+
+
+def _blocks(rays: list[Group]) -> Iterator[Group]:
+    """All rays, in full blocks."""
+    rays = [each for each in rays if len(each)]
+    if rays:
+        kind = type(rays[0])
+        columns = [[getattr(each, column.name) for each in rays] for column in fields(kind)]
+        whole = kind(*(np.concatenate(column, axis=-1) for column in columns))
+        yield from (whole.take(slice(start, start + BLOCK)) for start in range(0, len(whole), BLOCK))
+
+
+class _Frame:
+    """One picture, or part of one, in the making.
+
+    pixels  (n,) of the samples
+    """
+
+    def __init__(self, frames: Frames, uniforms: Uniforms, pass_index: int, pixels: NDArray[np.int64]):
+        self._scene, self._camera, self._table, self._bodies = frames.scene, frames.camera, frames.table, frames.bodies
+        self._seed, self._pass, self._pixels, self._uniforms = frames.seed, pass_index, pixels, uniforms
+        self._beams = beams(frames.scene.lights, pass_index)
+        self.radiance = np.zeros((3, len(pixels)), np.float32)
+        self.first_object = np.full(len(pixels), NOTHING)
+        self.rays = 0
+
+    def from_camera(self, sample: NDArray[np.intp]) -> Meeting:
+        """What camera rays meet that is an object."""
+        stream, direction = self._look(sample)
+        origin = np.broadcast_to(self._camera.origin[:, None], direction.shape)
+        met = self.cast(Rays(origin, direction, np.ones(len(sample), np.float32), stream, sample))
+        self.first_object[met.sample] = self._scene.triangle_object.take(met.triangle)
+        return met
+
+    def see_nothing(self, sample: NDArray[np.intp]) -> None:
+        """Add the sky that camera rays see that meet nothing."""
+        self.rays += len(sample)
+        if self._scene.lights.even:
+            self.radiance[:, sample] = self._scene.lights.background(np.zeros((3, 1), np.float32))
+            return
+        for part in _parts(sample):
+            self.radiance[:, part] = self._scene.lights.background(self._look(part)[1])
+
+    def _look(self, sample: NDArray[np.intp]) -> tuple[NDArray[np.uint64], Float32]:
+        pixel = self._pixels[sample]
+        stream = stream_keys(self._seed, self._pass, pixel)
+        return stream, self._camera.directions(pixel.astype(np.int32), np.stack(self._uniforms.draw(stream)))
+
+    def cast(self, rays: Rays) -> Meeting:
+        """Follow rays; add the lights and the sky that they meet, and keep what meets an object."""
+        scene = self._scene
+        self.rays += len(rays)
+        distance, triangle, u, v = scene.caster.closest_with_place(rays.origin, rays.direction)
+        for k, sphere in enumerate(scene.lights.spheres):
+            reach = sphere.distance(rays.origin, rays.direction)
+            nearer = reach < distance
+            np.copyto(distance, reach, where=nearer)
+            np.copyto(triangle, np.int32(-2 - k), where=nearer)
+        objects = np.flatnonzero((triangle >= 0) & (triangle < scene.first_light_triangle))
+        if len(objects) < len(rays):
+            self._meet_lights(rays, triangle)
+        columns = (each.take(objects, axis=-1) for each in (*vars(rays).values(), distance, triangle, u, v))
+        return Meeting(*columns)
+
+    def _meet_lights(self, rays: Rays, triangle: NDArray[np.int32]) -> None:
+        """Add the radiance of the sky and of lights with an extent; they end every ray."""
+        lights = self._scene.lights
+        sky = np.flatnonzero(triangle == -1)
+        self._add(rays, sky, lights.background(rays.direction.take(sky, axis=1)))
+        for k, sphere in enumerate(lights.spheres):
+            self._add(rays, np.flatnonzero(triangle == -2 - k), sphere.radiance)
+        for k, rectangle in enumerate(lights.rectangles):
+            met = np.flatnonzero((triangle - self._scene.first_light_triangle) // 2 == k)
+            front = _dot(rectangle.normal, rays.direction.take(met, axis=1)) < 0
+            self._add(rays, met[front], rectangle.radiance)
+
+    def _add(self, rays: Rays, which: NDArray[np.intp], radiance: Float32) -> None:
+        if len(which):
+            # every sample has one ray
+            self.radiance[:, rays.sample[which]] += rays.throughput[which] * radiance
+
+    def light(self, rays: Meeting) -> Rays:
+        """Add the scattered light of the objects that rays meet; their reflections."""
+        met = self._table.at(rays)
+        thing = self._scene.triangle_object.take(rays.triangle)
+        reflectance = np.zeros(len(rays), np.float32)
+        for index, body in self._bodies.items():
+            mine = np.flatnonzero(thing == index)
+            if len(mine) == len(rays):
+                reflectance = self._scattered(body, rays, met)
+            elif len(mine):
+                reflectance[mine] = self._scattered(body, rays.take(mine), met.take(mine))
+        turned = (2 * met.cosine) * met.normal
+        turned += rays.direction
+        # a shading normal may send them through the surface
+        going = np.flatnonzero((reflectance > 0) & (_dot(turned, met.facing) > 0))
+        origin = met.facing * RAY_OFFSET
+        origin += met.position
+        reflected = Rays(origin, turned, rays.throughput * reflectance, rays.stream, rays.sample)
+        return reflected if len(going) == len(rays) else reflected.take(going)
+
+    def _scattered(self, body: FastBody, rays: Meeting, met: Met) -> Float32:
+        """Add the light that leaves ``body`` along rays; the boundary's reflectance (n,) there."""
+        points = SurfacePoints(met.position, met.normal, met.curvature)
+        exitance = body.exitance(self._scene, points, rays.throughput, self._beams)
+        reflectance, _ = fresnel_reflectance(met.cosine, body.optics.ior)
+        exitance *= rays.throughput * (1 - reflectance) * exit_share(body.optics.ior)
+        self.radiance[:, rays.sample] += exitance
+        return reflectance
+
+    def roulette(self, rays: Rays, surfaces: int) -> Rays:
+        """See ``tracing.roulette.play_at_surfaces``."""
+        if surfaces <= FREE_SURFACES or not len(rays):
+            return rays
+        chance = np.minimum(rays.throughput / (2 * ROULETTE_BELOW), 1)
+        if surfaces > MANY_SURFACES:
+            chance = np.minimum(chance, LASTING)
+        u, _ = self._uniforms.draw(rays.stream)
+        lives = np.flatnonzero(u < chance)
+        rays = rays.take(lives)
+        return replace(rays, throughput=rays.throughput / chance[lives])
+
+
+def _dot(a: Float32, b: Float32) -> Float32:
+    return np.einsum("ij,ij->j", a, b) if a.shape == b.shape else np.einsum("ik,ij->j", a, b)
