@@ -40,8 +40,10 @@ class _Columns:
 
     def take(self, columns: NDArray[np.intp] | slice) -> Self:
         """Those at ``columns``."""
-        return type(self)(*(value[..., columns] if isinstance(columns, slice) else value.take(columns, axis=-1)
-                            for value in vars(self).values()))  # fmt: skip
+        return type(self)(*(
+            value if value is None else value[..., columns] if isinstance(columns, slice) else value.take(columns, -1)
+            for value in vars(self).values()
+        ))  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -86,6 +88,7 @@ class Met(_Columns):
     position, facing, normal  (3, n) float32: on the triangle, its normal on the ray's side, the shading normal there
     cosine                    (n,) float32 between ray and shading normal, above 0
     curvature                 (n,) float32 mean curvature
+    ambient                   (3, n) float32 or None, see ``SurfacePoints``
     """
 
     position: Float32
@@ -93,6 +96,7 @@ class Met(_Columns):
     normal: Float32
     cosine: Float32
     curvature: Float32
+    ambient: Float32 | None = None
 
 
 Group = TypeVar("Group", Rays, Meeting)
@@ -101,7 +105,8 @@ Group = TypeVar("Group", Rays, Meeting)
 class FaceTable:
     """What is looked up of a triangle, side by side in one row: its plane, and normal and curvature at its corners.
 
-    rows  (t, 16) float32: normal and curvature of each corner, normal of the triangle, its plane's distance
+    rows     (t, 16) float32: normal and curvature of each corner, normal of the triangle, its plane's distance
+    ambient  (t, 9) float32 or None: exitance at each corner, see ``ambient_field``
     """
 
     def __init__(self, scene: TracedScene, bodies: Mapping[int, FastBody]):
@@ -113,6 +118,13 @@ class FaceTable:
             if body.curvature is not None:
                 first = body.thing.first_triangle
                 corners[first : first + len(body.curvature), :, 3] = body.curvature
+        self.ambient = None
+        if any(body.ambient is not None for body in bodies.values()):
+            self.ambient = np.full((count, 9), np.nan, np.float32)
+            for body in bodies.values():
+                if body.ambient is not None:
+                    first = body.thing.first_triangle
+                    self.ambient[first : first + len(body.ambient)] = body.ambient.reshape(-1, 9)
         self.rows[:, 12:15] = scene.triangle_normal.T
         self.rows[:, 15] = scene.triangle_plane
 
@@ -139,7 +151,14 @@ class FaceTable:
         normal *= side / length
         flat *= side
         cosine = np.clip(-_dot(rays.direction, normal), np.float32(1e-4), 1)
-        return Met(position, flat, normal, cosine, mixed[3])
+        ambient = None
+        if self.ambient is not None:
+            columns = np.ascontiguousarray(self.ambient.take(rays.triangle, axis=0).T)
+            ambient = columns[0:3]
+            ambient *= 1 - rays.u - rays.v
+            ambient += rays.u * columns[3:6]
+            ambient += rays.v * columns[6:9]
+        return Met(position, flat, normal, cosine, mixed[3], ambient)
 
 
 def applies_to(scene: TracedScene, bodies: Mapping[int, FastBody]) -> bool:
@@ -196,7 +215,7 @@ class DirectTracer:
         frame.see_nothing(np.flatnonzero(~self._frames.covered[pixels]))
         tally = Tally()
         tally.rays, tally.samples = frame.rays, count
-        return Samples(frame.radiance, frame.first_object, 1, tally)
+        return Samples(frame.radiance.T, frame.first_object, 1, tally)
 
 
 def _parts(columns: NDArray[np.intp]) -> list[NDArray[np.intp]]:
@@ -223,7 +242,8 @@ class _Frame:
         self._scene, self._camera, self._table, self._bodies = frames.scene, frames.camera, frames.table, frames.bodies
         self._seed, self._pass, self._pixels, self._uniforms = frames.seed, pass_index, pixels, uniforms
         self._beams = beams(frames.scene.lights, pass_index)
-        self.radiance = np.zeros((3, len(pixels)), np.float32)
+        # a sample's channels side by side, as the film has them
+        self.radiance = np.zeros((len(pixels), 3), np.float32)
         self.first_object = np.full(len(pixels), NOTHING)
         self.rays = 0
 
@@ -239,10 +259,10 @@ class _Frame:
         """Add the sky that camera rays see that meet nothing."""
         self.rays += len(sample)
         if self._scene.lights.even:
-            self.radiance[:, sample] = self._scene.lights.background(np.zeros((3, 1), np.float32))
+            self.radiance[sample] = self._scene.lights.background(np.zeros((3, 1), np.float32)).T
             return
         for part in _parts(sample):
-            self.radiance[:, part] = self._scene.lights.background(self._look(part)[1])
+            self.radiance[part] = self._scene.lights.background(self._look(part)[1]).T
 
     def _look(self, sample: NDArray[np.intp]) -> tuple[NDArray[np.uint64], Float32]:
         pixel = self._pixels[sample]
@@ -280,7 +300,7 @@ class _Frame:
     def _add(self, rays: Rays, which: NDArray[np.intp], radiance: Float32) -> None:
         if len(which):
             # every sample has one ray
-            self.radiance[:, rays.sample[which]] += rays.throughput[which] * radiance
+            self.radiance[rays.sample[which]] += (rays.throughput[which] * radiance).T
 
     def light(self, rays: Meeting) -> Rays:
         """Add the scattered light of the objects that rays meet; their reflections."""
@@ -304,11 +324,11 @@ class _Frame:
 
     def _scattered(self, body: FastBody, rays: Meeting, met: Met) -> Float32:
         """Add the light that leaves ``body`` along rays; the boundary's reflectance (n,) there."""
-        points = SurfacePoints(met.position, met.normal, met.curvature)
+        points = SurfacePoints(met.position, met.normal, met.curvature, met.ambient)
         exitance = body.exitance(self._scene, points, rays.throughput, self._beams)
         reflectance, _ = fresnel_reflectance(met.cosine, body.optics.ior)
         exitance *= rays.throughput * (1 - reflectance) * exit_share(body.optics.ior)
-        self.radiance[:, rays.sample] += exitance
+        self.radiance[rays.sample] += exitance.T
         return reflectance
 
     def roulette(self, rays: Rays, surfaces: int) -> Rays:

@@ -24,7 +24,8 @@ from .scene.admission import admit
 from .scene.camera import CameraRays
 from .scene.description import Scene
 from .scene.fingerprint import scene_hash
-from .shaders import FAST_SHADERS, diffuse, selection
+from .shaders import FAST_SHADERS, diffuse, plumb, selection
+from .shaders.ambient_field import corner_field
 from .shaders.fast_body import FastBody
 from .shaders.selection import DEFAULT_QUALITY, Plan
 from .shaders.surface import BodyOptics
@@ -103,8 +104,8 @@ class Renderer:
                 self.scene, [plan.shader for plan in self.plans], [plan.hole_handling for plan in self.plans]
             )
             self.camera = CameraRays(scene.camera, self.traced.frame)
-            self._fast_bodies = _fast_bodies(self.traced)
             width, height = scene.camera.resolution
+            self._fast_bodies = _fast_bodies(self.traced, width * height, settings.threads or os.cpu_count() or 1)
             self.acceleration = Acceleration.chosen(self.traced, width * height)
             self._frames = None
             if direct.applies_to(self.traced, self._fast_bodies):
@@ -317,8 +318,9 @@ def planned_hash(scene: Scene, plans: list[Plan]) -> str:
     return digest.hexdigest()
 
 
-def _fast_bodies(traced: TracedScene) -> dict[int, FastBody]:
+def _fast_bodies(traced: TracedScene, pixels: int, threads: int) -> dict[int, FastBody]:
     """What the faster shaders need, for the objects that use them and no others."""
+    even = any(environment.constant is not None for environment in traced.lights.environments)
     media = {thing.index: thing.medium for thing in traced.objects}
     bodies: dict[int, FastBody] = {}
     for thing in traced.objects:
@@ -332,8 +334,20 @@ def _fast_bodies(traced: TracedScene) -> dict[int, FastBody]:
         if shader is not diffuse:
             curvature = _corner_curvature(traced, thing)
             _ = optics.tables  # now, and not in every thread at once
-        bodies[thing.index] = FastBody(thing, shader, optics, curvature)
+        field = None
+        # with more corners than pixels the frame itself is faster
+        if curvature is not None and shader is plumb and even and len(curvature) < pixels:
+            field = _ambient_field(traced, thing, optics, curvature, threads)
+        bodies[thing.index] = FastBody(thing, shader, optics, curvature, field)
     return bodies
+
+
+def _ambient_field(traced, thing: TracedObject, optics: BodyOptics, curvature, threads: int) -> NDArray[np.float32]:
+    mesh = traced.scene.objects[thing.index].mesh
+    points = np.empty_like(mesh.topology.points)
+    own = traced.triangles[thing.first_triangle : thing.first_triangle + len(mesh.faces)]
+    points[mesh.topology.faces] = traced.vertices[own]
+    return corner_field(mesh, points, curvature, lambda some, axes: plumb.ambient(traced, some, optics, axes), threads)
 
 
 def _corner_curvature(traced: TracedScene, thing: TracedObject) -> NDArray[np.float32]:

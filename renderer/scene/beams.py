@@ -69,7 +69,7 @@ class RectanglePoint:
 
     def illuminate(self, position: Float32) -> Illumination:
         """What arrives at ``position`` (3, n)."""
-        return self._rectangle.sample(position, *self._share)
+        return self._rectangle.sample_at(position, self._share)
 
 
 def beams(lights: LightSet, pass_index: int) -> list[Beam]:

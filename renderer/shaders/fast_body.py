@@ -38,12 +38,14 @@ class FastBody:
 
     curvature  (faces of the object, 3) float32 mean curvature at the corners, in the frame; None where the shader
                needs none
+    ambient    (faces of the object, 3, 3) float32, see ``ambient_field``; None where there is none
     """
 
     thing: TracedObject
     shader: ModuleType
     optics: BodyOptics
     curvature: Float32 | None
+    ambient: Float32 | None = None
 
     def meet(
         self,
@@ -62,7 +64,7 @@ class FastBody:
         side = -np.copysign(np.float32(1), np.einsum("ij,ij->j", direction, geometric))
         facing, normal = geometric * side, scene.shading_normal(position, triangle) * side
         view_cosine = np.clip(-np.einsum("ij,ij->j", direction, normal), np.float32(1e-4), 1)
-        points = SurfacePoints(position, normal, self._curvature_at(scene, position, triangle))
+        points = self._points(scene, position, normal, triangle)
         exitance = self.exitance(scene, points, paths.throughput[:, index].max(axis=0), beams)
         leaving = outgoing_radiance(exitance, view_cosine, self.optics.ior)
         radiance[:, paths.sample[index]] += paths.throughput[:, index] * leaving
@@ -90,11 +92,13 @@ class FastBody:
             result[:, columns] = shader.exitance(scene, points.take(columns), self.optics, beams)
         return result
 
-    def _curvature_at(self, scene: TracedScene, position: Float32, triangle: NDArray[np.int32]) -> Float32:
+    def _points(self, scene: TracedScene, position: Float32, normal: Float32, triangle) -> SurfacePoints:
         if self.curvature is None:
-            return np.zeros(len(triangle), np.float32)
-        corners = self.curvature[triangle - self.thing.first_triangle]
-        return np.einsum("ij,ji->j", scene.barycentric(position, triangle), corners)
+            return SurfacePoints(position, normal, np.zeros(len(triangle), np.float32))
+        weights, face = scene.barycentric(position, triangle), triangle - self.thing.first_triangle
+        curvature = np.einsum("ij,ji->j", weights, self.curvature[face])
+        ambient = None if self.ambient is None else np.einsum("ij,jik->kj", weights, self.ambient[face])
+        return SurfacePoints(position, normal, curvature, ambient)
 
     def _reflect_rough(self, scene, paths, index, position, normal, facing, eta, uniforms, tally, radiance) -> None:
         """The reflecting half of the GGX boundary, with the highlights of lights."""

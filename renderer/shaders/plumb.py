@@ -44,8 +44,10 @@ def exitance(caster: Caster, points: SurfacePoints, body: BodyOptics, beams: Ite
 
 def _shade(caster: Caster, points: SurfacePoints, body: BodyOptics, beam: Beam) -> Float32:
     if beam.ambient:
-        assert beam.axes is not None
-        return _ambient(caster, points, body, beam.axes) * np.asarray(beam.radiance, np.float32)[:, None]
+        axes = beam.axes
+        assert axes is not None
+        exitance = points.under_even_light(lambda some: ambient(caster, some, body, axes))
+        return exitance * np.asarray(beam.radiance, np.float32)[:, None]
     direction, distance, irradiance = beam.at(points.position)
     x = cosine_to(points.normal, direction)
     towards = _towards(caster, points, body, direction, distance, x)
@@ -126,7 +128,7 @@ def solved_body(body: BodyOptics, x: Float32, radius: Float32, curvature: Float3
     return ball
 
 
-def _ambient(caster: Caster, points: SurfacePoints, body: BodyOptics, axes: Float32) -> Float32:
+def ambient(caster: Caster, points: SurfacePoints, body: BodyOptics, axes: Float32) -> Float32:
     """(3, n) exitance under radiance 1 from everywhere.
 
     A few directions k tell how the body differs from one ball and what stands before it; what the ball itself

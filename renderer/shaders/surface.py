@@ -71,11 +71,14 @@ class SurfacePoints:
     position   (3, n) float32
     normal     (3, n) float32 unit length, outward
     curvature  (n,) float32 mean curvature, 1/length, positive for a ball
+    ambient    (3, n) float32 exitance under radiance 1 from everywhere as far as it is known beforehand, else NaN;
+               None where nothing is
     """
 
     position: Float32
     normal: Float32
     curvature: Float32
+    ambient: Float32 | None = None
 
     def __len__(self) -> int:
         return self.position.shape[1]
@@ -83,14 +86,27 @@ class SurfacePoints:
     def take(self, columns: NDArray[np.intp]) -> SurfacePoints:
         """The points at ``columns``."""
         return SurfacePoints(self.position.take(columns, axis=1), self.normal.take(columns, axis=1),
-                             self.curvature.take(columns))  # fmt: skip
+                             self.curvature.take(columns),
+                             None if self.ambient is None else self.ambient.take(columns, axis=1))  # fmt: skip
 
     def blocks(self) -> Iterator[tuple[slice, SurfacePoints]]:
         """At most ``BLOCK`` points at a time, with their place."""
         for start in range(0, len(self), BLOCK):
             part = slice(start, min(start + BLOCK, len(self)))
-            yield part, SurfacePoints(*(np.ascontiguousarray(a[..., part], np.float32)
-                                        for a in (self.position, self.normal, self.curvature)))  # fmt: skip
+            position, normal, curvature = (np.ascontiguousarray(a[..., part], np.float32)
+                                           for a in (self.position, self.normal, self.curvature))  # fmt: skip
+            ambient = None if self.ambient is None else self.ambient[:, part]
+            yield part, SurfacePoints(position, normal, curvature, ambient)
+
+    def under_even_light(self, found: Callable[[SurfacePoints], Float32]) -> Float32:
+        """(3, n) exitance under radiance 1 from everywhere: ``ambient``, and where it is not known ``found``."""
+        if self.ambient is None:
+            return found(self)
+        result = self.ambient.copy()
+        unknown = np.flatnonzero(np.isnan(result[0]))
+        if len(unknown):
+            result[:, unknown] = found(self.take(unknown))
+        return result
 
 
 @dataclass(frozen=True, eq=False)

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose
+from numpy.testing import assert_allclose, assert_array_equal
 
 from renderer.scene.description import (
     DirectionalLight,
@@ -252,3 +252,25 @@ def test_density_is_that_with_which_directions_are_drawn(position):
         assert_allclose(beam.irradiance[0] * beam.density, beam.irradiance[0] > 0, rtol=1e-5)
     behind = column(0, 0, 2).astype(np.float32)
     assert RectangleSource(rectangle, HERE).density(behind)[0] == 0
+
+
+def test_single_precision_is_enough_for_wide_rectangles():
+    """Directions within 1e-5 radians, light within 1e-5 of it and 5e-6 of the light face to face."""
+    light = RectangleLight(np.array([2.0, 3, 2]), np.zeros(3), np.array([0.0, 1, 0]), (1.0, 1.0), np.ones(3))
+    source = RectangleSource(light, HERE)
+    assert source.wide
+    position = np.random.default_rng(3).uniform(-0.5, 0.5, (3, 20000)).astype(np.float32)
+    share = np.array([0.3, 0.9])
+    ours, exact = source.sample_at(position, share), source.sample(position, *share)
+    assert ours.direction.dtype == ours.irradiance.dtype == ours.distance.dtype == np.float32
+    assert_allclose(ours.direction, exact.direction, atol=1e-5)
+    assert_allclose(ours.irradiance, exact.irradiance, rtol=1e-5, atol=5e-6)
+    assert_allclose(ours.distance, exact.distance, rtol=1e-5)
+
+
+def test_small_rectangles_are_sampled_in_double_precision():
+    light = RectangleLight(np.array([20.0, 3, 2]), np.zeros(3), np.array([0.0, 1, 0]), (1.0, 1.0), np.ones(3))
+    source = RectangleSource(light, HERE)
+    assert not source.wide
+    position, share = np.zeros((3, 1), np.float32), np.array([0.3, 0.9])
+    assert_array_equal(source.sample_at(position, share).irradiance, source.sample(position, *share).irradiance)
