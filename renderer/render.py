@@ -44,6 +44,8 @@ once."""
 _UNIT_SECONDS = 2.0
 _LEAST_UNIT_PIXELS = 8192
 _FIRST_SAMPLES = 2**13
+_FIELD_FACES = 2**17
+"""Faces at whose corners a constant environment's light is found beforehand, however small the picture."""
 
 
 @dataclass(frozen=True)
@@ -335,8 +337,8 @@ def _fast_bodies(traced: TracedScene, pixels: int, threads: int) -> dict[int, Fa
             curvature = _corner_curvature(traced, thing)
             _ = optics.tables  # now, and not in every thread at once
         field = None
-        # with more corners than pixels the frame itself is faster
-        if curvature is not None and shader is plumb and even and len(curvature) < pixels:
+        # else frames themselves are sooner done
+        if curvature is not None and shader is plumb and even and len(curvature) <= max(pixels, _FIELD_FACES):
             field = _ambient_field(traced, thing, optics, curvature, threads)
         bodies[thing.index] = FastBody(thing, shader, optics, curvature, field)
     return bodies

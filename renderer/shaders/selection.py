@@ -214,8 +214,10 @@ def _aspect(thing: SceneObject) -> float:
     weights = mesh.face_areas
     if weights.sum() == 0:
         return 1.0
-    covariance = np.cov(centres.T, aweights=weights)
-    variances = np.maximum(np.linalg.eigvalsh(covariance), 0)
+    offset = centres - np.average(centres, axis=0, weights=weights)
+    variances = np.maximum(np.linalg.eigvalsh((offset.T * weights) @ offset), 0)
+    if variances[-1] == 0:
+        return 1.0  # a single face
     return float(np.sqrt(variances[-1] / max(variances[0], 1e-12 * variances[-1])))
 
 

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from renderer import render
 from renderer.render import Renderer, Settings
 from renderer.scene.description import EnvironmentLight
 from renderer.scene.lights import fibonacci_directions
@@ -96,7 +97,8 @@ def test_large_faces_are_left_out_and_asked_pixel_by_pixel():
     assert np.abs(ours - theirs).max() > 1e-3
 
 
-def test_pictures_with_fewer_pixels_than_corners_ask_pixel_by_pixel():
+def test_small_pictures_of_meshes_with_many_faces_ask_pixel_by_pixel(monkeypatch):
+    monkeypatch.setattr(render, "_FIELD_FACES", 1000)
     assert renderer(icosphere(1.0, 4), resolution=(32, 32))._fast_bodies[0].ambient is None
 
 
