@@ -20,7 +20,7 @@ from .optics.dielectric import fresnel_reflectance
 from .scene.beams import beams
 from .scene.camera import CameraRays
 from .scene.coverage import covered_pixels
-from .shaders.fast_body import FastBody
+from .shaders.fast_body import FastBody, keep_outside
 from .shaders.surface import SurfacePoints, exit_share
 from .tracing.paths import ROULETTE_BELOW
 from .tracing.roulette import FREE_SURFACES, LASTING, MANY_SURFACES
@@ -315,8 +315,8 @@ class _Frame:
                 reflectance[mine] = self._scattered(body, rays.take(mine), met.take(mine))
         turned = (2 * met.cosine) * met.normal
         turned += rays.direction
-        # a shading normal may send them through the surface
-        going = np.flatnonzero((reflectance > 0) & (_dot(turned, met.facing) > 0))
+        keep_outside(turned, met.facing)
+        going = np.flatnonzero(reflectance > 0)
         origin = met.facing * RAY_OFFSET
         origin += met.position
         reflected = Rays(origin, turned, rays.throughput * reflectance, rays.stream, rays.sample)

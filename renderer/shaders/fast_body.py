@@ -132,7 +132,16 @@ class FastBody:
 
     @staticmethod
     def _send_on(paths: Paths, index: NDArray[np.intp], position: Float32, facing: Float32, turned: Float32) -> None:
-        paths.alive[index] &= np.einsum("ij,ij->j", turned, facing) > 0
+        keep_outside(turned, facing)
         paths.direction[:, index] = turned
         paths.origin[:, index] = offset_from(position, facing, np.ones(len(index), np.float32))
         paths.density[index] = np.inf
+
+
+def keep_outside(turned: Float32, facing: Float32) -> None:
+    """Mirror directions (3, n), in place, that a shading normal sent through the true surface, whose normals on the
+    viewer's side are ``facing``: the light is kept, as in ``boundary``."""
+    height = np.einsum("ij,ij->j", turned, facing)
+    wrong = np.flatnonzero(height < 0)
+    if len(wrong):
+        turned[:, wrong] -= 2 * height[wrong] * facing[:, wrong]

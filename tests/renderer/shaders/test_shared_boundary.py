@@ -20,7 +20,7 @@ LIGHTS = {
     "rectangle": RectangleLight(np.array([1.5, 2, 3]), np.zeros(3), np.array([0.0, 1, 0]), (0.8, 0.8), np.full(3, 4.0)),
     "ball": SphereLight(np.array([1.5, 2, 3]), 0.8, np.full(3, 4.0)),
 }
-PASSES = 40
+PASSES = 64
 
 
 def passes(shader: str, light: str, roughness: float, count: int) -> np.ndarray:
@@ -62,13 +62,16 @@ def test_a_difference_of_mirror_images_is_found(monkeypatch):
 
 
 def assert_same_highlight(shown: np.ndarray, path: np.ndarray, tests: int) -> None:
-    """Means over the picture of each pass, in its bright half and in the other: independent from pass to pass."""
-    bright = path.mean(axis=0)
-    bright = bright > np.median(bright[bright > 0])
-    for where in (bright, ~bright):
+    """Means of each pass over the quarter with the highlight and over the rest: independent from pass to pass.
+
+    Errors of a fifth are seen; the rest of the picture is a few faint, noisy pixels.
+    """
+    quarter = np.zeros(path.shape[1:], bool)
+    quarter[:16, 16:] = True
+    for where in (quarter, ~quarter):
         ours, theirs = (each[:, where].mean(axis=1) for each in (shown, path))
-        expected = theirs.mean()
-        assert_mean((ours - theirs) / expected, 0.0, false_alarm=shared_rate(1e-4, 2 * tests), detects=0.06)
+        difference = (ours - theirs) / theirs.mean()
+        assert_mean(difference, 0.0, false_alarm=shared_rate(1e-4, 2 * tests), detects=0.2)
 
 
 @pytest.mark.parametrize("light", LIGHTS)
