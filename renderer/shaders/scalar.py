@@ -54,8 +54,12 @@ def _arriving(caster, points: SurfacePoints, body: BodyOptics, direction, distan
     origin = points.position + along * direction
     # the normal where the light enters is the point's own mirrored across the light
     origin += lift * (points.normal - np.minimum(2 * x, 0) * direction)
-    # either way round, the feeler starts lift |x| nearer to the light
-    left = distance - along - lift * np.abs(x)
+    # from there to the same place of the light: a parallel ray would end in the light's plane too soon, and be shaded
+    left = distance
+    if np.isfinite(distance).all():
+        direction = points.position + distance * direction - origin
+        left = np.sqrt(np.einsum("ij,ij->j", direction, direction))
+        direction /= np.maximum(left, np.float32(1e-20))
     limit = np.clip(left * np.float32(1 - 1e-4), 0, np.float32(1e37))
     arriving = np.ones(len(points), np.float32)
     lit = np.flatnonzero(x >= 0)
