@@ -324,7 +324,7 @@ class _Frame:
 
     def _scattered(self, body: FastBody, rays: Meeting, met: Met) -> Float32:
         """Add the light that leaves ``body`` along rays; the boundary's reflectance (n,) there."""
-        points = SurfacePoints(met.position, met.normal, met.curvature, met.ambient)
+        points = SurfacePoints(met.position, met.normal, met.curvature, -rays.direction, met.ambient)
         exitance = body.exitance(self._scene, points, rays.throughput, self._beams)
         reflectance, _ = fresnel_reflectance(met.cosine, body.optics.ior)
         exitance *= rays.throughput * (1 - reflectance) * exit_share(body.optics.ior)

@@ -64,7 +64,7 @@ class FastBody:
         side = -np.copysign(np.float32(1), np.einsum("ij,ij->j", direction, geometric))
         facing, normal = geometric * side, scene.shading_normal(position, triangle) * side
         view_cosine = np.clip(-np.einsum("ij,ij->j", direction, normal), np.float32(1e-4), 1)
-        points = self._points(scene, position, normal, triangle)
+        points = self._points(scene, position, normal, triangle, -direction)
         exitance = self.exitance(scene, points, paths.throughput[:, index].max(axis=0), beams)
         leaving = outgoing_radiance(exitance, view_cosine, self.optics.ior)
         radiance[:, paths.sample[index]] += paths.throughput[:, index] * leaving
@@ -92,13 +92,15 @@ class FastBody:
             result[:, columns] = shader.exitance(scene, points.take(columns), self.optics, beams)
         return result
 
-    def _points(self, scene: TracedScene, position: Float32, normal: Float32, triangle) -> SurfacePoints:
+    def _points(
+        self, scene: TracedScene, position: Float32, normal: Float32, triangle, viewer: Float32
+    ) -> SurfacePoints:
         if self.curvature is None:
-            return SurfacePoints(position, normal, np.zeros(len(triangle), np.float32))
+            return SurfacePoints(position, normal, np.zeros(len(triangle), np.float32), viewer)
         weights, face = scene.barycentric(position, triangle), triangle - self.thing.first_triangle
         curvature = np.einsum("ij,ji->j", weights, self.curvature[face])
         ambient = None if self.ambient is None else np.einsum("ij,jik->kj", weights, self.ambient[face])
-        return SurfacePoints(position, normal, curvature, ambient)
+        return SurfacePoints(position, normal, curvature, viewer, ambient)
 
     def _reflect_rough(self, scene, paths, index, position, normal, facing, eta, uniforms, tally, radiance) -> None:
         """The reflecting half of the GGX boundary, with the highlights of lights."""

@@ -3,11 +3,13 @@
 The chord of length d runs into the body on the light's line, towards the light where the surface faces away from
 it (x = N.L < 0) and away from the light where it faces it, and fits a ball of radius R_e = d/(2|x|). For a ball this
 is exact on both sides of the terminator, where R_e tends to the radius of the normal section, so there is no seam.
+What the fitted ball sends out is looked up with its directions (``optics.emergence``) and bent towards the slab where
+the surface is flatter than the ball (``solved_body``).
 
-Good when: the body is round; within the error of the ball series (see ``optics.ball``).
-Wrong when: the body is long or flat. Unlit sides are off by a factor of 1.1 to 1.5 at 2:1 flat and 1.8 to 3.4 at 2:1
-long, more beyond: a single length cannot tell a ball from a slab, whose light differs by 2 to 5 times.
-Light that crosses the body unscattered is left out; it matters for bodies thinner than about three mean free paths.
+Good when: the body is round; errors by body and medium are in docs/fast_shaders.md.
+Wrong when: the body is long or flat, on its unlit side: a single length cannot tell a ball from a slab, whose light
+differs by 2 to 5 times. Light that leaves the body and enters it again is left out, and so is light that crosses it
+unscattered, which a parallel beam sends to no viewer outside itself.
 """
 
 from __future__ import annotations
@@ -33,6 +35,9 @@ the shading normal."""
 CHORD_COUNTS = 0.05, 0.15
 """|x| below which the curvature radius alone is used, chords being noisy there, and above which the chord alone."""
 
+_UNCOUNTED = np.float32(0.25)
+"""Depth before the body, in transport mean free paths, that is taken for corners of its own faces."""
+
 _FAR_SIDE_COUNTS = np.float32(0.01)
 """What comes through the body from the far end of an axis is not followed there below this share of the near end's."""
 
@@ -57,7 +62,11 @@ def _shade(caster: Caster, points: SurfacePoints, body: BodyOptics, beam: Beam) 
         some = points.take(lit)
         chord[lit] = _chord_behind(caster, some, body, -direction.take(lit, axis=1))
     radius = ball_radius(body, points.curvature, x, chord)
-    return solved_body(body, x, radius, points.curvature) * _arriving(towards, x, body) * irradiance
+    found = solved_body(body, x, radius, points.curvature)
+    body.seen(found, x, radius, points, direction)
+    found *= _arriving(towards, x, body)
+    found *= irradiance
+    return found
 
 
 def _towards(caster, points: SurfacePoints, body: BodyOptics, direction, distance, x) -> LightLine:
@@ -79,15 +88,18 @@ def _arriving(line: LightLine, x: Float32, body: BodyOptics) -> Float32:
     """(3, n) or (1, n) share of the beam left by what stands before the body.
 
     Opaque things let nothing through. Translucent ones, folds of the same body among them, add their depth to
-    the way already inside, which begins at nothing on either side of the terminator.
+    the way already inside, which begins at nothing on either side of the terminator. A quarter of a transport mean
+    free path is not counted: lines that leave a body at grazing angles cut the corners of its faces, and a seam of the
+    width of a face would show where they do.
     """
     left = np.where(line.blocked, np.float32(0), np.float32(1))[None]
-    behind = np.flatnonzero((line.depth > 0) & ~line.blocked)
+    depth = line.depth - _UNCOUNTED * body.transport_length.mean()
+    behind = np.flatnonzero((depth > 0) & ~line.blocked)
     if len(behind) == 0:
         return left
     left = np.repeat(left, 3, axis=0)
     before = np.where(x[behind] < 0, np.nan_to_num(line.chord[behind]), np.float32(0))
-    left[:, behind] = body.passed_on(before, line.depth[behind])
+    left[:, behind] = body.passed_on(before, depth[behind])
     return left
 
 
@@ -110,22 +122,28 @@ def ball_radius(body: BodyOptics, curvature: Float32, x: Float32, chord: Float32
 def solved_body(body: BodyOptics, x: Float32, radius: Float32, curvature: Float32) -> Float32:
     """(3, n) exitance per irradiance: the ball's, bent towards the slab's where the surface is flatter than the ball.
 
-    B(x; R_e) (slab/B)^{(1 - g) x^4},   g = clip(R_e H, 0, 2)
+        B + w (S - B) for w = (1 - R_e H) x^2 > 0,   B (S/B)^w, R_e H at most 2, else
+
+    with S the slab's at the thickness d |x| = 2 R_e x^2 that it has if the chord crosses it. A plane lit straight on is
+    the slab, and what is rounder than the ball is as far from the slab on the other side. x^2 fades the slab out
+    towards the terminator, where its thickness and its light tend to nothing.
     """
     ball = body.ball_exitance(x, radius)
-    steep = np.abs(x)
-    slab = body.slab_exitance(x, 2 * radius * steep)
-    flatness = 1 - np.clip(radius * curvature, 0, 2)
-    flatness *= (steep * steep) ** 2
-    floor = np.float32(1e-9)
-    np.maximum(slab, floor, out=slab)
-    np.maximum(ball, floor, out=ball)
-    slab /= ball
-    np.log(slab, out=slab)
-    slab *= flatness
-    np.exp(slab, out=slab)
-    ball *= slab
-    return ball
+    square = x * x
+    slab = body.slab_exitance(x, 2 * radius * square)
+    weight = 1 - np.clip(radius * curvature, 0, 2)
+    weight *= square
+    long = np.flatnonzero(weight < 0)
+    if len(long):
+        floor = np.float32(1e-9)
+        apart = np.maximum(slab[:, long], floor) / np.maximum(ball[:, long], floor)
+        bent = ball[:, long] * np.power(apart, weight[long])
+    slab -= ball
+    slab *= weight
+    slab += ball
+    if len(long):
+        slab[:, long] = bent
+    return slab
 
 
 def ambient(caster: Caster, points: SurfacePoints, body: BodyOptics, axes: Float32) -> Float32:

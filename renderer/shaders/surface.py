@@ -19,6 +19,7 @@ from sss_tools.medium import Medium, diffuse_reflectance
 from ..optics import lookup
 from ..optics.ball import BallTable, ball_table
 from ..optics.dielectric import diffuse_external_reflectance, fresnel_reflectance
+from ..optics.emergence import EmergenceTable, emergence_table, scattered_once
 from ..optics.slab import diffusion
 
 Float32 = NDArray[np.float32]
@@ -26,6 +27,10 @@ Float32 = NDArray[np.float32]
 BLOCK = 16384
 """Points worked on at a time: few enough for the second-level cache, and enough that threads seldom wait for each
 other between NumPy's calls (a plumb frame on two cores takes a fifth less than with 8192)."""
+
+_RADII = np.float32(lookup.RADII[0]), np.float32(lookup.RADII[-1])
+_FAINT_SHARE = 1e-3
+"""Share of light scattered once below which it is not looked for."""
 
 
 class Caster(Protocol):
@@ -71,6 +76,7 @@ class SurfacePoints:
     position   (3, n) float32
     normal     (3, n) float32 unit length, outward
     curvature  (n,) float32 mean curvature, 1/length, positive for a ball
+    viewer     (3, n) float32 unit direction to the viewer; None where only the exitance matters
     ambient    (3, n) float32 exitance under radiance 1 from everywhere as far as it is known beforehand, else NaN;
                None where nothing is
     """
@@ -78,6 +84,7 @@ class SurfacePoints:
     position: Float32
     normal: Float32
     curvature: Float32
+    viewer: Float32 | None = None
     ambient: Float32 | None = None
 
     def __len__(self) -> int:
@@ -85,18 +92,18 @@ class SurfacePoints:
 
     def take(self, columns: NDArray[np.intp]) -> SurfacePoints:
         """The points at ``columns``."""
+        viewer, ambient = (None if a is None else a.take(columns, axis=1) for a in (self.viewer, self.ambient))
         return SurfacePoints(self.position.take(columns, axis=1), self.normal.take(columns, axis=1),
-                             self.curvature.take(columns),
-                             None if self.ambient is None else self.ambient.take(columns, axis=1))  # fmt: skip
+                             self.curvature.take(columns), viewer, ambient)  # fmt: skip
 
     def blocks(self) -> Iterator[tuple[slice, SurfacePoints]]:
         """At most ``BLOCK`` points at a time, with their place."""
         for start in range(0, len(self), BLOCK):
             part = slice(start, min(start + BLOCK, len(self)))
-            position, normal, curvature = (np.ascontiguousarray(a[..., part], np.float32)
-                                           for a in (self.position, self.normal, self.curvature))  # fmt: skip
+            arrays = (self.position, self.normal, self.curvature, self.viewer)
             ambient = None if self.ambient is None else self.ambient[:, part]
-            yield part, SurfacePoints(position, normal, curvature, ambient)
+            yield part, SurfacePoints(*(None if a is None else np.ascontiguousarray(a[..., part], np.float32)
+                                        for a in arrays), ambient)  # type: ignore[arg-type]  # fmt: skip
 
     def under_even_light(self, found: Callable[[SurfacePoints], Float32]) -> Float32:
         """(3, n) exitance under radiance 1 from everywhere: ``ambient``, and where it is not known ``found``."""
@@ -184,6 +191,47 @@ class BodyOptics:
         columns = lookup.columns_at(x)
         rows = self.rows(radius)
         return np.stack([lookup.interpolate(t.ball, r, columns) for t, r in zip(self.tables, rows, strict=True)])
+
+    @cached_property
+    def emergence(self) -> tuple[EmergenceTable, EmergenceTable, EmergenceTable]:
+        """Directions of each channel's light."""
+        red, green, blue = (emergence_table(float(a), self.ior) for a in self.medium.reduced_albedo)
+        return red, green, blue
+
+    def seen(self, exitance: Float32, x: Float32, radius: Float32, points: SurfacePoints, direction: Float32) -> None:
+        """Turn exitance (3, n) of balls under a beam into what the viewer sees of it, in place.
+
+        That is the exitance of a surface that is as bright from all sides and sends the viewer the same radiance:
+        the ball's two parts of ``optics.emergence`` over its exitance. Nothing is done where nobody views.
+        """
+        if points.viewer is None:
+            return
+        view = np.clip(cosine_to(points.normal, points.viewer), np.float32(1e-3), 1)
+        _, inside = fresnel_reflectance(view, self.ior)
+        # v' = v/eta + (mu' - mu/eta) n
+        to_light = cosine_to(direction, points.viewer) * np.float32(1 / self.ior)
+        sideways = to_light - view * np.float32(1 / self.ior) * x
+        to_light = sideways + inside * x
+        columns = lookup.columns_at(x)
+        once, length = np.zeros_like(x), np.float32(0)
+        for channel, (table, rows) in enumerate(zip(self.emergence, self.rows(radius), strict=True)):
+            share = lookup.interpolate(table.share, rows, columns)
+            if self.transport_length[channel] != length:
+                length = self.transport_length[channel]
+                paths = np.clip(radius / length, *_RADII)
+                counts = np.flatnonzero(share > _FAINT_SHARE)
+                once = np.zeros_like(x)
+                once[counts] = scattered_once(
+                    x[counts], paths[counts], inside[counts], to_light[counts], self.ior
+                )  # fmt: skip
+            falls = sideways / paths
+            falls *= lookup.interpolate(table.slope, rows, columns)
+            often = np.where(falls > 0, 1 / (1 + np.maximum(falls, 0)), 1 - falls)
+            often *= (1 - share) * (np.float32(table.norm) + np.float32(table.norm * table.depth) * inside)
+            ball = lookup.interpolate(self.tables[channel].ball, rows, columns)
+            unit = np.float32(table.unit * self.medium.reduced_albedo[channel])
+            often += unit * once / np.maximum(ball, np.float32(1e-9))
+            exitance[channel] *= often
 
     def slab_exitance(self, x: Float32, thickness: Float32) -> Float32:
         """(3, n) exitance of the slab per irradiance, at signed cosines; see ``BallTable.slab``."""
