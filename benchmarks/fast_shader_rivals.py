@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from renderer.optics.dielectric import boundary_mismatch, diffuse_external_reflectance, transmittance
-from renderer.shaders import diffuse, plumb
+from renderer.shaders import diffuse
 from renderer.shaders.light_line import follow
 from renderer.shaders.surface import BodyOptics, SurfacePoints, cosine_to
 from renderer.tracing.traced_scene import TracedScene
@@ -21,9 +21,11 @@ from sss_tools.rays import RAY_OFFSET
 
 Float32 = NDArray[np.float32]
 
-POINTS_PER_PATCH = 3.0
+POINTS_PER_PATCH = 2.0
 """Points of the dipole's integration for each square transport mean free path of surface."""
-MOST_POINTS = 40_000
+MOST_POINTS = 12_000
+_STEPS = 16384
+"""Steps of the table of the profile over distance."""
 PAIRS = 2**21
 """Pairs of points worked on at a time."""
 
@@ -146,12 +148,17 @@ class Dipole:
         place, entering = place[:, lit].T, entering[:, lit] * np.float32(patch)
         total = np.zeros((3, len(points)), np.float32)
         step = max(PAIRS // max(len(lit), 1), 1)
+        reach = 2 * body.bounding_radius
+        distance = ((np.arange(_STEPS) + 0.5) * (reach / _STEPS)).astype(np.float32)
+        profiles = [self._profile(distance * distance, body, channel) for channel in range(3)]
         for start in range(0, len(points), step):
             here = points.position[:, start : start + step].T
             square = ((here * here).sum(axis=1)[:, None] + (place * place).sum(axis=1)) - 2 * here @ place.T
             np.maximum(square, 0, out=square)
+            place_in_table = (np.sqrt(square, out=square) * np.float32(_STEPS / reach)).astype(np.int32)
             for channel in range(3):
-                total[channel, start : start + step] = self._profile(square, body, channel) @ entering[channel]
+                profile = profiles[channel].take(place_in_table, mode="clip")
+                total[channel, start : start + step] = profile @ entering[channel]
         return total
 
     @staticmethod
@@ -186,6 +193,3 @@ def _behind(caster, points: SurfacePoints, body: BodyOptics, beams):
 def outgoing_share(ior: float) -> float:
     """pi (1 - Fe): exitance over radiance before the view's transmittance."""
     return float(np.pi * (1 - diffuse_external_reflectance(ior)))
-
-
-__all__ = ["Dipole", "Lambert", "LambertBehind", "Thesis", "Wrap", "outgoing_share", "plumb"]

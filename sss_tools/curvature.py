@@ -7,8 +7,14 @@ neighbouring edges opposite ways, cancels. The curvature of the edges is spread 
 (Desbrun et al. 1999, Implicit Fairing), and what the first step flattened is given back by a second one ("twicing",
 Tukey 1977), so that smooth features a few edges wide keep their height.
 
-Against quadric fitting over five rings (libigl's principal_curvature): equal on noise, 10 times closer on a sphere,
-3 times closer on a torus, 5 times worse where the radius of curvature is one edge.
+Chosen by benchmarks/curvature.py, root mean square errors in percent with noise of 0 / 0.5 / 2 / 5 % of an edge:
+
+    ball   ours 0.1 / 1.6 / 6.4 / 16   libigl 0.7 / 1.8 / 6.6 / 16   MeshLab 0 / 30 / 118 / 292
+    torus  ours 0.7 / 2.1 / 7.8 / 19   libigl 5.0 / 5.4 / 9.2 / 20   MeshLab 0 / 35 / 139 / 339
+
+libigl fits quadrics over five rings (principal_curvature), MeshLab takes one ring (Meyer et al. 2003). Ours is as
+robust as libigl's, closer on clean meshes, takes two to three times as long (0.3 s for 20000 faces), brings no native
+library into rendering, and is 5 times worse than libigl's where the radius of curvature is one edge.
 """
 
 from __future__ import annotations

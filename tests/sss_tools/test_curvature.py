@@ -55,6 +55,16 @@ def test_noise_cancels():
     assert relative_error(mesh, 1.0) < 0.1
 
 
+def test_noise_disturbs_no_more_than_quadrics_of_libigl():
+    """Quadrics over five rings, on a ball with noise; benchmarks/curvature.py has more, and a torus."""
+    igl = pytest.importorskip("igl")
+    for share in (0.0, 0.02):
+        mesh = noisy_ball(share)
+        first, second = igl.principal_curvature(mesh.vertices, np.ascontiguousarray(mesh.faces, np.int64))[2:4]
+        quadrics = np.abs(np.ravel(first) + np.ravel(second)) / 2
+        assert relative_error(mesh, 1.0) <= np.sqrt(np.mean((quadrics - 1) ** 2))
+
+
 def test_the_integral_over_a_surface_survives_averaging():
     """int H dA of a box is pi/4 sum of edge lengths (each right angle gives half of pi/2)."""
     mesh = box((1.0, 2.0, 3.0))
