@@ -40,7 +40,7 @@ class Lambert:
 class LambertBehind:
     """Lambert in front, and behind it |x| e^{-k d} with the chord d towards the light (Green 2004, GPU Gems 16)."""
 
-    NAME = "Lambert + |x| exp(-kd)"
+    NAME = "Lambert + exp(-kd)"
 
     @staticmethod
     def exitance(caster, points: SurfacePoints, body: BodyOptics, beams) -> Float32:

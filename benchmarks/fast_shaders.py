@@ -11,8 +11,9 @@ Boundaries are matched or smooth, so that a parallel light makes no highlight: p
 reflection of the body in itself. Path's own noise is taken out of squared errors by splitting its passes in two
 halves, and stays in FLIP, whose floor the row "path" shows: one half of the passes held against the other.
 
-References are kept in --cache, as long as scenes stay what they are; empty it when path changes. Writes
-fast_shaders.json, fast_shaders.md and images/fast_shaders.png into FOLDER, docs/ by default.
+References are kept in --cache, as long as scenes stay what they are, and so are the rows of all cases; empty it when path
+changes. Writes fast_shaders.md
+and images/fast_shaders.png into FOLDER, docs/ by default.
 """
 
 from __future__ import annotations
@@ -87,6 +88,9 @@ def main() -> None:
     """The command."""
     options = _options()
     rows: list[dict] = []
+    earlier = options.cache / "rows.json"
+    if options.only and earlier.is_file():
+        rows = [row for row in json.loads(earlier.read_text()) if row["body"] not in options.only]
     options.output.mkdir(parents=True, exist_ok=True)
     for body, mesh in bodies(options.meshes):
         if options.only and body not in options.only:
@@ -94,7 +98,8 @@ def main() -> None:
         for case in cases(body, mesh):
             rows += measure(case, mesh, options.cache)
         # a page after each body: what is done stays where the rest is interrupted
-        (options.output / "fast_shaders.json").write_text(json.dumps(rows, separators=(",", ":")) + "\n")
+        options.cache.mkdir(parents=True, exist_ok=True)
+        earlier.write_text(json.dumps(rows, separators=(",", ":")) + "\n")
         (options.output / "fast_shaders.md").write_text(markdown(rows))
         draw(rows, options.output / "images" / "fast_shaders.png")
         print(body, flush=True)
@@ -278,7 +283,7 @@ def markdown(rows: list[dict]) -> str:
     """docs/fast_shaders.md."""
     lines = [
         "# How right the fast shaders are", "",
-        "Made by `benchmarks/fast_shaders.py`; `fast_shaders.json` has every case. Errors against the path shader, in "
+        "Made by `benchmarks/fast_shaders.py`. Errors against the path shader, in "
         "percent of the part's mean light: median and ninth decile of the absolute signed error of whole parts of "
         "pictures, and the median of the root mean square over pixels, path's noise taken out.", "",
         "Bodies: " + "; ".join(f"*{group}*: {', '.join(dict.fromkeys(r['body'] for r in pick(rows, group=group)))}"
@@ -350,7 +355,7 @@ def _options() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--meshes", type=Path, help="folder of the real meshes, such as ../shared/meshes")
     parser.add_argument("--cache", type=Path, default=Path(tempfile.gettempdir()) / "fast_shaders")
-    parser.add_argument("--only", nargs="*", metavar="BODY")
+    parser.add_argument("--only", nargs="*", metavar="BODY", help="measure these anew, keep the others' rows")
     parser.add_argument("-o", "--output", type=Path, default=Path("docs"))
     return parser.parse_args()
 
