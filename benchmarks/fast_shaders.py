@@ -11,9 +11,8 @@ Boundaries are matched or smooth, so that a parallel light makes no highlight: p
 reflection of the body in itself. Path's own noise is taken out of squared errors by splitting its passes in two
 halves, and stays in FLIP, whose floor the row "path" shows: one half of the passes held against the other.
 
-References are kept in --cache, as long as scenes stay what they are, and so are the rows of all cases; empty it when path
-changes. Writes fast_shaders.md
-and images/fast_shaders.png into FOLDER, docs/ by default.
+References are kept in --cache, as long as scenes stay what they are, and so are the rows of all cases; empty it when
+path changes. Writes fast_shaders.md and images/fast_shaders.png into FOLDER, docs/ by default.
 """
 
 from __future__ import annotations
