@@ -100,10 +100,10 @@ class SurfacePoints:
         """At most ``BLOCK`` points at a time, with their place."""
         for start in range(0, len(self), BLOCK):
             part = slice(start, min(start + BLOCK, len(self)))
-            arrays = (self.position, self.normal, self.curvature, self.viewer)
-            ambient = None if self.ambient is None else self.ambient[:, part]
-            yield part, SurfacePoints(*(None if a is None else np.ascontiguousarray(a[..., part], np.float32)
-                                        for a in arrays), ambient)  # type: ignore[arg-type]  # fmt: skip
+            position, normal, curvature = (np.ascontiguousarray(a[..., part], np.float32)
+                                           for a in (self.position, self.normal, self.curvature))  # fmt: skip
+            viewer, ambient = (None if a is None else a[:, part] for a in (self.viewer, self.ambient))
+            yield part, SurfacePoints(position, normal, curvature, viewer, ambient)
 
     def under_even_light(self, found: Callable[[SurfacePoints], Float32]) -> Float32:
         """(3, n) exitance under radiance 1 from everywhere: ``ambient``, and where it is not known ``found``."""

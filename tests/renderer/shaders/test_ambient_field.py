@@ -43,7 +43,7 @@ def test_between_corners_it_is_what_plumb_finds_there():
     triangle = np.arange(0, len(traced.triangles), 7, dtype=np.int32)
     position = np.ascontiguousarray(traced.vertices[traced.triangles[triangle]].mean(axis=1).T)
     normal = traced.shading_normal(position, triangle)
-    points = body._points(traced, position, normal, triangle)
+    points = body._points(traced, position, normal, triangle, normal)
     assert points.ambient is not None
     axes = np.ascontiguousarray(fibonacci_directions(24)[:, :12])
     plain = SurfacePoints(points.position, points.normal, points.curvature)
@@ -57,7 +57,7 @@ def test_it_is_nearer_to_many_axes_than_the_axes_of_a_pass():
     body, traced = of._fast_bodies[0], of.traced
     triangle = np.arange(len(traced.triangles), dtype=np.int32)
     position = np.ascontiguousarray(traced.vertices[traced.triangles].mean(axis=1).T)
-    points = body._points(traced, position, traced.shading_normal(position, triangle), triangle)
+    points = body._points(traced, position, traced.shading_normal(position, triangle), triangle, position)
     plain = SurfacePoints(points.position, points.normal, points.curvature)
 
     def by(axes: int):

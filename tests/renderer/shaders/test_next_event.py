@@ -10,7 +10,6 @@ import pytest
 
 from renderer.optics.guided_flight import Guide
 from renderer.render import Renderer, Settings
-from renderer.scene import lights
 from renderer.scene.description import EnvironmentLight, Light, RectangleLight, Scene, SphereLight
 from renderer.shaders import boundary, direct_light, point_light
 from renderer.tracing.acceleration import Acceleration
@@ -106,7 +105,7 @@ def samples(case: Case, number: int) -> np.ndarray:
 def by_chance_alone(patch: pytest.MonkeyPatch) -> None:
     """Nothing is left to sampled lights."""
     patch.setattr("renderer.wavefront.power_heuristic", lambda mine, other: np.float32(1))
-    patch.setattr(lights, "power_heuristic", lambda mine, other: np.float32(1))
+    patch.setattr("renderer.scene.lights.light_set.power_heuristic", lambda mine, other: np.float32(1))
     patch.setattr(direct_light, "power_heuristic", lambda mine, other: np.zeros_like(mine))
 
 
@@ -142,7 +141,7 @@ def test_sampled_lights_change_the_noise_and_not_the_mean(by_chance, name):
 @pytest.mark.parametrize("name", ["matched ball, shining ball", "floor, near rectangle"])
 def test_light_that_is_counted_both_ways_in_full_is_caught(by_chance, name, monkeypatch):
     monkeypatch.setattr("renderer.wavefront.power_heuristic", lambda mine, other: np.float32(1))
-    monkeypatch.setattr(lights, "power_heuristic", lambda mine, other: np.float32(1))
+    monkeypatch.setattr("renderer.scene.lights.light_set.power_heuristic", lambda mine, other: np.float32(1))
     with pytest.raises(AssertionError, match="wrong mean"):
         assert_same_mean(samples(CASES[name], 2), by_chance(name), CASES[name].detects, FALSE_ALARM)
 
@@ -179,7 +178,7 @@ BODIES = {
 def under_white_sky(name: str, number: int, *, sampled: bool) -> np.ndarray:
     material, passes, _ = BODIES[name]
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(lights, "UNEVEN_SKY", 0.0 if sampled else np.inf)
+        patch.setattr("renderer.scene.lights.environment.UNEVEN_SKY", 0.0 if sampled else np.inf)
         return samples(Case(lambda: scene([placed(BALL, material)], [WHITE_IMAGE], VIEW), passes, 0, 0), number)
 
 
