@@ -12,7 +12,7 @@ ellipsoids; their coefficients beyond those are judgements.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -133,7 +133,7 @@ def _plan(scene: Scene, thing: SceneObject, quality: float, shader: str, wish: s
     elif wanted != "auto":
         chosen, reason = wanted, "asked for"
     else:
-        chosen = next(name for name in CHEAPEST_FIRST if name == "path" or errors[name] <= allowed)
+        chosen = _cheapest(errors, allowed)
         reason = _reason(chosen, errors, allowed, look.size_px, quality)
     mean_free_path = float(np.mean(thing.material.medium.mean_free_path)) / look.footprint
     error = None if (chosen == "path" and passes is None) or handling == "surface" else errors[chosen]
@@ -141,6 +141,29 @@ def _plan(scene: Scene, thing: SceneObject, quality: float, shader: str, wish: s
     return Plan(
         thing.name, state, handling, chosen, reason, look.distance, mean_free_path, look.size_px, error, warning
     )
+
+
+def _cheapest(errors: dict[str, float], allowed: float) -> str:
+    return next(name for name in CHEAPEST_FIRST if name == "path" or errors[name] <= allowed)
+
+
+def thresholds(scene: Scene, thing: SceneObject, quality: float = DEFAULT_QUALITY) -> list[tuple[float, str, str]]:
+    """At which distances between the camera and the middle of ``thing`` its shader would change, nearest first.
+
+    Each is (distance in scene units, shader nearer than that, shader farther), as if the camera moved along its line
+    to the object, and to 1 %; looked for from a tenth of the object's size to 10 000 times.
+    """
+    look, camera = appearance(scene, thing), scene.camera
+    size = _diameter(thing)
+    distances = size * 10 ** np.arange(-1, 4, np.log10(1.01))
+    chosen = []
+    for distance in distances:
+        footprint = pixel_footprint(camera, float(distance))
+        there = replace(look, footprint=footprint, size_px=size / footprint)
+        chosen.append(_cheapest(predicted_errors(there), tolerance(quality, there.size_px)))
+    return [
+        (float(distances[k]), chosen[k - 1], chosen[k]) for k in range(1, len(chosen)) if chosen[k] != chosen[k - 1]
+    ]
 
 
 def _handling(thing: SceneObject, wish: str) -> tuple[str, str]:

@@ -109,16 +109,28 @@ def check_mesh(
 
     A rule that raises one of ``FAULTS`` ends as ``not-run`` with ``raised`` set; the others still run.
     """
-    settings = settings or Settings()
+    return check_subject(Subject(mesh, context), settings, path)
+
+
+def check_subject(
+    subject: Subject,
+    settings: Settings | None = None,
+    path: str | Path | None = None,
+    listed: int | None = LISTED,
+) -> MeshReport:
+    """Run the rules over a subject, which afterwards holds what they found out (``subject.assessment``).
+
+    listed  how many indices of each kind the report lists; None for all
+    """
+    settings, mesh = settings or Settings(), subject.mesh
     start = time.perf_counter()
     report = MeshReport(str(path or mesh.path or ""), vertices=len(mesh.vertices), faces=len(mesh.faces))
-    subject = Subject(mesh, context)
     blocked = None
     opaque = OPAQUE if subject.context.opaque else None
     # numbers too large or small for double precision are findings, not warnings on the terminal
     with np.errstate(all="ignore"):
         for rule in sorted(all_rules(), key=lambda rule: not rule.on_file):
-            result = _run(rule, subject, settings, None if rule.on_file else blocked or opaque)
+            result = _run(rule, subject, settings, None if rule.on_file else blocked or opaque, listed)
             report.rules.append(result)
             if result.outcome == Outcome.FAIL and rule.code in UNUSABLE:
                 blocked = f"{rule.name}: {result.message}"
@@ -173,7 +185,9 @@ def _report_unreadable(path: str | Path, error: InputError, settings: Settings) 
     return report
 
 
-def _run(rule: Rule, subject: Subject, settings: Settings, blocked: str | None) -> RuleReport:
+def _run(
+    rule: Rule, subject: Subject, settings: Settings, blocked: str | None, listed: int | None = LISTED
+) -> RuleReport:
     """One rule's result; ``blocked`` is why the geometry cannot be looked at."""
     if not rule.on_file and not settings.wants(rule.code):
         return _not_run(rule, settings, "not selected")
@@ -191,7 +205,7 @@ def _run(rule: Rule, subject: Subject, settings: Settings, blocked: str | None) 
         return result
     if finding is None:
         return _blank(rule, settings, Outcome.PASS)
-    return _failure(rule, finding, subject.mesh, settings)
+    return _failure(rule, finding, subject.mesh, settings, listed)
 
 
 def _blank(rule: Rule, settings: Settings, outcome: Outcome, reason: str | None = None) -> RuleReport:
@@ -203,8 +217,8 @@ def _not_run(rule: Rule, settings: Settings, reason: str) -> RuleReport:
     return _blank(rule, settings, Outcome.NOT_RUN, reason)
 
 
-def _failure(rule: Rule, finding: Finding, mesh: Mesh, settings: Settings) -> RuleReport:
-    """A finding with its place, cut to what a report lists."""
+def _failure(rule: Rule, finding: Finding, mesh: Mesh, settings: Settings, listed: int | None = LISTED) -> RuleReport:
+    """A finding with its place, cut to the first ``listed`` indices of each kind."""
     result = _blank(rule, settings, Outcome.FAIL)
     result.count, result.message = finding.count, finding.message
     faces, edges, vertices, pairs = (
@@ -219,9 +233,9 @@ def _failure(rule: Rule, finding: Finding, mesh: Mesh, settings: Settings) -> Ru
         if len(places):
             result.bbox = [_numbers(places.min(axis=0)), _numbers(places.max(axis=0))]
             result.centroid = _numbers(places.mean(axis=0))
-    result.faces, result.edges = faces[:LISTED].tolist(), edges[:LISTED].tolist()
-    result.vertices, result.face_pairs = vertices[:LISTED].tolist(), pairs[:LISTED].tolist()
-    result.truncated = any(len(indices) > LISTED for indices in (faces, edges, vertices, pairs))
+    result.faces, result.edges = faces[:listed].tolist(), edges[:listed].tolist()
+    result.vertices, result.face_pairs = vertices[:listed].tolist(), pairs[:listed].tolist()
+    result.truncated = listed is not None and any(len(indices) > listed for indices in (faces, edges, vertices, pairs))
     return result
 
 
