@@ -38,6 +38,9 @@ def _inspect(argv: Sequence[str] | None) -> int:
         raise InputError("--picture", "goes on a page", "add --html FILE.html, or leave it out")
 
     picture = None if options.picture is None else _read_picture(options.picture)
+    interactive = options.screenshot is None and options.html is None
+    if interactive:
+        _refuse_without_screen()
 
     from renderer.inspection.exhibit import put_together
 
@@ -54,9 +57,24 @@ def _inspect(argv: Sequence[str] | None) -> int:
             from renderer.inspection.page import render_page
 
             _write(options.html, render_page(exhibit, picture, options.clip).encode(errors="backslashreplace"))
-    if not options.quiet:
+    if interactive:
+        from renderer.inspection.window import Window
+
+        Window(exhibit, options.clip).run()
+    elif not options.quiet:
         _say(exhibit, options)
     return 0
+
+
+def _refuse_without_screen() -> None:
+    from renderer.inspection import gl
+
+    drawable = gl.preflight()
+    if drawable.window is None:
+        raise InputError("no window can be opened", drawable.problem, "or use --screenshot FILE.png, --html FILE.html")
+    if not drawable.on_screen:
+        raise InputError("no window can be opened", "there is no display",
+                         "set DISPLAY, or use --screenshot FILE.png or --html FILE.html")  # fmt: skip
 
 
 def _write_still(exhibit: Exhibit, options: Any) -> None:

@@ -22,6 +22,9 @@ XRAY_SHARE = 0.1
 """Largest share of a mesh's faces that a hidden finding may have to shine through what is before it; one that lies
 inside always does."""
 
+OUTLINED = 40
+"""Most faces of a spot whose sides are drawn."""
+
 
 @dataclass(frozen=True, eq=False)
 class Surface:
@@ -115,6 +118,7 @@ def put_together(inspection: Inspection, colour: str = "finding") -> Exhibit:
             surfaces.append(_cap(number, specimen, frame))
             legend.add("holes", "cap", palette.CAP)
     strokes = [_edges(spot, inspection, frame) for spot in spots if len(spot.edges)]
+    strokes += [_outline(s, inspection, frame) for s in spots if 0 < len(s.faces) <= OUTLINED and not len(s.edges)]
     labels: list = []
     if inspection.scene is not None and inspection.scene.path is not None:
         drawn = scenery.draw(inspection.scene, frame, inspection.specimens)
@@ -144,6 +148,15 @@ def _cap(number: int, specimen: Specimen, frame: UnitFrame) -> Surface:
 def _edges(spot: Spot, inspection: Inspection, frame: UnitFrame) -> Strokes:
     points = frame.points_in(inspection.specimens[spot.specimen].mesh.vertices)[spot.edges]
     return Strokes(points.astype(np.float32), spot.colour, 5.0, shining=True)
+
+
+def _outline(spot: Spot, inspection: Inspection, frame: UnitFrame) -> Strokes:
+    """The sides of the faces of a small spot: faces without area or width show no colour."""
+    mesh = inspection.specimens[spot.specimen].mesh
+    faces = mesh.faces[spot.faces]
+    sides = frame.points_in(mesh.vertices)[np.stack([faces, np.roll(faces, -1, axis=1)], axis=2).reshape(-1, 2)]
+    sides = sides[np.logical_and.reduce(np.isfinite(sides), axis=(1, 2))]
+    return Strokes(sides.astype(np.float32), palette.mixed(spot.colour, palette.INK, 0.25), 2.0)
 
 
 def _shining_faces(inspection: Inspection, spots: tuple[Spot, ...]) -> list[NDArray[np.bool_]]:

@@ -16,7 +16,8 @@ MISSING = (
     "no OpenGL library that works was found: install libegl1 and libgl1-mesa-dri (Debian), mesa-libEGL and "
     "mesa-dri-drivers (Fedora) or mesalib (conda-forge)"
 )
-NO_WINDOW = "there is no display to open a window on: use --screenshot FILE.png or --html FILE.html"
+OFF_SCREEN = ("vtkEGLRenderWindow", "vtkOSOpenGLRenderWindow")
+"""VTK's windows that no screen shows."""
 
 _QUESTION = """
 import sys
@@ -52,6 +53,11 @@ class Drawable:
     window: str | None
     problem: str = ""
 
+    @property
+    def on_screen(self) -> bool:
+        """Whether there is a screen to open windows on."""
+        return self.window is not None and self.window not in OFF_SCREEN
+
 
 def preflight(question: str = _QUESTION) -> Drawable:
     """Draw one picture in another process and see whether it comes back.
@@ -74,10 +80,3 @@ def preflight(question: str = _QUESTION) -> Drawable:
     window = answer[-1].removeprefix("drawn by ")
     os.environ.setdefault(WINDOW, window)
     return Drawable(window)
-
-
-def display() -> str | None:
-    """Why no window can be opened here; None where it can be tried."""
-    if sys.platform.startswith("linux") and not os.environ.get("DISPLAY"):
-        return NO_WINDOW
-    return None

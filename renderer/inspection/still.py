@@ -14,7 +14,7 @@ from .exhibit import Exhibit
 from .layer import Artist, Clip, seen_through
 from .lettering import Line, Pointer, panel, point_at, titled
 from .spots import Spot
-from .viewpoint import Viewpoint, directions, framing
+from .viewpoint import Viewpoint, centred, directions
 
 SIZE = (1400, 1000)
 PANEL = 330
@@ -40,9 +40,12 @@ def compose(exhibit: Exhibit, artist: Artist, size: tuple[int, int] = SIZE, clip
     side = min(PANEL, width // 3)
     main = width - side
     foot = min(main // CLOSE_UPS, height // 4)
-    view = view or exhibit.overview(main / (height - foot))
-    chosen = _close_up_choice(exhibit, view, (main, height - foot), clip)
-    tall = height - foot if chosen else height
+    given, tall = view, height - foot
+    view = given or exhibit.overview(main / tall)
+    chosen = _close_up_choice(exhibit, view, (main, tall), clip)
+    if not chosen:
+        tall = height
+        view = given or exhibit.overview(main / tall)
     layer = seen_through(artist, view, (main, tall))
     pointers = _pointers(exhibit, view, (main, tall), layer.depth, chosen, clip)
     picture = point_at(layer.image, pointers)
@@ -131,19 +134,19 @@ def close_view(exhibit: Exhibit, number: int, aspect: float, fallback: Viewpoint
         direction = views[0] if fallback is None else fallback.position - fallback.target
     else:
         direction = views[int(np.argmax(exhibit.visibility.share[number] * (1.2 + views @ spot.normal)))]
-    return framing(direction, _around(exhibit, spot), aspect)
+    radius = _reach(exhibit, spot) / min(aspect, 1.0)
+    return centred(direction, spot.centre, radius)
 
 
-def _around(exhibit: Exhibit, spot: Spot) -> NDArray[np.float64]:
-    """Corners of a box to hold for a close-up: the spot and what is about it, at least some faces wide."""
+def _reach(exhibit: Exhibit, spot: Spot) -> float:
+    """Radius of what a close-up holds: the spot and what is about it, at least some faces wide."""
     surface = exhibit.surfaces[spot.specimen]
     place = np.searchsorted(surface.source, spot.faces[:200])
     corners = surface.points[surface.faces[place[place < len(surface.faces)]]].astype(float)
     sides = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)
-    grain = float(np.median(sides.max(axis=1))) if len(corners) else 0.02
-    radius = max(1.6 * spot.radius, 2.2 * min(grain, 0.2), 2e-5)
-    box = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], float)
-    return spot.centre + 0.7 * radius * box
+    grain = 2.2 * min(float(np.median(sides.max(axis=1))), 0.2) if len(corners) else 0.04
+    # long faces that fan out from a small place say little about it
+    return max(1.6 * spot.radius, min(grain, 6 * spot.radius) if spot.radius > 0 else grain, 2e-5)
 
 
 def _close_up(exhibit, artist, view, number, size, letter) -> NDArray[np.uint8]:

@@ -82,14 +82,20 @@ def directions() -> NDArray[np.float64]:
     return np.array(found)
 
 
+def centred(direction, target: Vector, radius: float, fov: float = FOV) -> Viewpoint:
+    """The view from ``direction`` with ``target`` in the middle and a ball of ``radius`` about it filling it."""
+    backward = _unit(np.asarray(direction, float))
+    distance = radius / math.sin(math.radians(fov) / 2)
+    return Viewpoint(target + distance * backward, np.asarray(target, float), _upward(backward), fov)
+
+
 def framing(direction, points: NDArray[np.float64], aspect: float, fov: float = FOV) -> Viewpoint:
     """The nearest view from ``direction`` that holds all ``points`` (n, 3), in the middle.
 
     aspect  width over height of the picture
     """
     backward = _unit(np.asarray(direction, float))
-    up = UP if abs(backward[1]) < 0.99 else np.array([0.0, 0.0, -1.0])
-    right = _unit(np.cross(up, backward))
+    right = _unit(np.cross(_upward(backward), backward))
     axes = np.stack([right, np.cross(backward, right), backward])
     middle = (points.min(axis=0) + points.max(axis=0)) / 2
     x, y, b = axes @ (points - middle).T
@@ -98,6 +104,10 @@ def framing(direction, points: NDArray[np.float64], aspect: float, fov: float = 
     target = middle + across * axes[0] + upwards * axes[1]
     distance = max(needed, needed_too, float(b.max()) + 1e-6)
     return Viewpoint(target + distance * backward, target, axes[1], fov)
+
+
+def _upward(backward: Vector) -> Vector:
+    return UP if abs(backward[1]) < 0.99 else np.array([0.0, 0.0, -1.0])
 
 
 def _touching(x, back, slope: float) -> tuple[float, float]:

@@ -108,7 +108,7 @@ def add_strokes(plotter: Any, strokes: Strokes, finer: int = 1) -> Any:
     )  # fmt: skip
     # lines on a surface win over it
     actor.mapper.SetResolveCoincidentTopologyToPolygonOffset()
-    actor.mapper.SetRelativeCoincidentTopologyLineOffsetParameters(-4, -8)
+    actor.mapper.SetRelativeCoincidentTopologyLineOffsetParameters(-1, -4)
     return actor
 
 
