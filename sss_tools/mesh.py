@@ -132,3 +132,9 @@ class Mesh:
         from .topology import Topology
 
         return Topology(self)
+
+    def _repr_png_(self) -> bytes | None:
+        """How notebooks show it."""
+        from .thumbnail import thumbnail
+
+        return thumbnail([self])

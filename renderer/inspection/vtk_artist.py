@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -46,7 +46,8 @@ class VtkArtist:
         if key not in self._plotters:
             import pyvista
 
-            plotter: Any = pyvista.Plotter(off_screen=True, window_size=list(size), lighting="none")
+            plotter = cast(Any, pyvista.Plotter(off_screen=True, window_size=list(size), lighting="none"))
+            plotter.render_window.SetMultiSamples(0)  # pixels are averaged already
             plotter.add_light(pyvista.Light(light_type="headlight"))
             plotter.set_background(palette.BACKGROUND)
             drawn = fill(plotter, self._exhibit, self._clip, shining, FINER)
@@ -78,14 +79,14 @@ def fill(plotter: Any, exhibit: Exhibit, clip: Clip | None = None, shining: bool
     return drawn
 
 
-def add_surface(plotter: Any, surface: Surface, faces, opacity: float = 1.0) -> list[Any]:
+def add_surface(plotter: Any, surface: Surface, faces) -> list[Any]:
     """Put some faces of a surface into a plotter, fronts and backs; returns their actors."""
     import pyvista
 
     body = pyvista.PolyData.from_regular_faces(surface.points.astype(float), surface.faces[faces])
     body.cell_data["colour"] = surface.colours[faces]
     common = {
-        "smooth_shading": False, "ambient": 0.35, "diffuse": 0.65, "specular": 0.0, "opacity": opacity,
+        "smooth_shading": False, "ambient": 0.35, "diffuse": 0.65, "specular": 0.0,
         "show_scalar_bar": False, "reset_camera": False, "render": False,
     }  # fmt: skip
     # VTK gives both sides of a face the same scalars

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -15,8 +15,8 @@ from .still import close_view
 from .viewpoint import Viewpoint
 from .vtk_artist import add_strokes, add_surface, clipped, look
 
-LIGHT = 150_000
-"""Most faces drawn while the view turns; at rest all are."""
+LIGHT = 80_000
+"""Most faces drawn while the view turns; at rest all are. Software takes a tenth of a second for them, on two cores."""
 XRAY = 0.3
 """How opaque the wall is while what is inside is to be seen."""
 HELP = "n next finding   p previous   x through the wall   r whole   click: what is this face?   q quit"
@@ -34,9 +34,11 @@ class Window:
 
         self.exhibit, self.spot, self.told, self.xray = exhibit, -1, "", False
         self._clip, self._size = clip, size
-        self.plotter: Any = pyvista.Plotter(window_size=list(size), lighting="none", title=exhibit.inspection.title)
+        plotter = pyvista.Plotter(window_size=list(size), lighting="none", title=exhibit.inspection.title)
+        self.plotter = cast(Any, plotter)
         self.plotter.add_light(pyvista.Light(light_type="headlight"))
         self.plotter.set_background(palette.BACKGROUND)
+        self.plotter.render_window.SetMultiSamples(0)  # software takes as long for them as for all the rest
         self._fine: list[Any] = []
         self._coarse: list[Any] = []
         self._glow: list[Any] = []
@@ -90,7 +92,7 @@ class Window:
         picker = vtkCellPicker()
         picker.SetTolerance(0)
         picker.PickFromListOn()
-        self._show_fine(True)
+        self.show_fine(True)
         for actor in self._fine:
             picker.AddPickList(actor)
         picker.Pick(x, y, 0, self.plotter.renderer)
@@ -122,7 +124,10 @@ class Window:
             self._surface_of += [surface] * len(actors)
             if total > LIGHT:
                 light = simplified(surface, max(int(LIGHT * len(surface.faces) / total), 100))
-                self._coarse += add_surface(plotter, light, np.arange(len(light.faces)))
+                fronts, backs = add_surface(plotter, light, np.arange(len(light.faces)))
+                fronts.prop.culling = "none"  # one pass while it turns
+                plotter.remove_actor(backs, reset_camera=False, render=False)
+                self._coarse.append(fronts)
             if surface.shining.any():
                 self._glow += add_surface(plotter, surface, np.flatnonzero(surface.shining))
         strokes = [add_strokes(plotter, strokes) for strokes in exhibit.strokes if len(strokes.ends)]
@@ -131,7 +136,7 @@ class Window:
         for actor in self._glow:
             actor.visibility = False
         self._label()
-        self._show_fine(True)
+        self.show_fine(True)
 
     def _label(self) -> None:
         """A dot and the code at every place, as large on the screen from near and far."""
@@ -161,8 +166,8 @@ class Window:
             plotter.reset_key_events() if key == "n" else None
             plotter.add_key_event(key, act)
         interactor = plotter.iren
-        interactor.add_observer("StartInteractionEvent", lambda *_: self._show_fine(False))
-        interactor.add_observer("EndInteractionEvent", lambda *_: (self._show_fine(True), plotter.render()))
+        interactor.add_observer("StartInteractionEvent", lambda *_: self.show_fine(False))
+        interactor.add_observer("EndInteractionEvent", self._rest)
         self._pressed = (0, 0)
         interactor.add_observer("LeftButtonPressEvent", self._press)
         interactor.add_observer("LeftButtonReleaseEvent", self._release)
@@ -177,7 +182,11 @@ class Window:
             self.ask(x, y)
             self.plotter.render()
 
-    def _show_fine(self, fine: bool) -> None:
+    def _rest(self, *_: Any) -> None:
+        self.show_fine(True)
+        self.plotter.render()
+
+    def show_fine(self, fine: bool) -> None:
         """All faces at rest; fewer while the view turns, where there are many."""
         if not self._coarse:
             return

@@ -170,6 +170,14 @@ class Film:
         error[self.biased] = np.nan
         return error
 
+    def _repr_png_(self) -> bytes | None:
+        """How notebooks show it: the picture so far, as a PNG file would; None before the first pass."""
+        if self.passes == 0:
+            return None
+        from .image import film_png
+
+        return film_png(self)
+
     def object_pixels(self) -> NDArray[np.bool_]:
         """(h, w) pixels whose every camera sample met a translucent object first."""
         taken = self.passes - self.skipped

@@ -129,11 +129,12 @@ def linear_to_srgb(linear) -> NDArray:
     return np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * np.power(linear, 1 / 2.4) - 0.055)
 
 
-def _png(picture: Picture) -> bytes:
+def film_png(film: Film) -> bytes:
+    """A PNG of the mean radiance: sRGB, 8 bits, cut at 1; pixels without a valid sample are magenta."""
     from PIL import Image
     from PIL.PngImagePlugin import PngInfo
 
-    mean = picture.film.mean()
+    mean = film.mean()
     shown = np.where(np.isnan(mean), (1.0, 0.0, 1.0), np.clip(mean, 0, 1))
     about = PngInfo()
     about.add(b"sRGB", b"\0")  # the colour space, perceptual intent
@@ -141,6 +142,10 @@ def _png(picture: Picture) -> bytes:
     file = io.BytesIO()
     Image.fromarray(pixels).save(file, "PNG", pnginfo=about)
     return file.getvalue()
+
+
+def _png(picture: Picture) -> bytes:
+    return film_png(picture.film)
 
 
 def _exr(picture: Picture) -> bytes:

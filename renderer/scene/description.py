@@ -157,3 +157,31 @@ class Scene:
     objects: tuple[SceneObject, ...]
     hash: str = field(default="", compare=False)
     path: Path | None = None
+
+    def _repr_png_(self) -> bytes | None:
+        """How notebooks show it: the objects as the camera sees them, without light."""
+        from sss_tools.thumbnail import Eye, thumbnail
+
+        from .camera import view_basis
+
+        forward, left, up = view_basis(self.camera)
+        slope = float(np.tan(np.radians(self.camera.fov) / 2))
+        width, height = self.camera.resolution
+        smaller = max(width, height) / 400
+        size = (max(round(width / smaller), 1), max(round(height / smaller), 1))
+        position = np.asarray(self.camera.position, float)
+        return thumbnail([thing.mesh for thing in self.objects], size, Eye(position, -left, up, forward, slope))
+
+    def _repr_html_(self) -> str:
+        """The same picture, and a table of the objects."""
+        import base64
+        from html import escape
+
+        rows = "".join(
+            f"<tr><td>{escape(thing.name)}</td><td>{type(thing.material).__name__.lower()}</td>"
+            f"<td>{len(thing.mesh.faces):,} faces</td></tr>"
+            for thing in self.objects
+        )
+        picture = base64.b64encode(self._repr_png_() or b"").decode()
+        lights = f"{len(self.lights)} light{'' if len(self.lights) == 1 else 's'}"
+        return f'<img src="data:image/png;base64,{picture}"><table>{rows}</table><p>{lights}; unit {self.unit}</p>'

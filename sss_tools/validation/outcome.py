@@ -127,6 +127,12 @@ class MeshReport:
                 gathered.setdefault(rule.reason or "no reason given", []).append(rule)
         return gathered
 
+    def _repr_html_(self) -> str:
+        """How notebooks show it."""
+        from ..report.html_table import render
+
+        return render(self)
+
     @property
     def exit_status(self) -> int:
         """0, 1 for a finding at error level, 2 for a file that cannot be used or a rule that raised."""
