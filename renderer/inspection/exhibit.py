@@ -15,13 +15,15 @@ from sss_tools.rays import UnitFrame
 from . import palette, scenery
 from .colouring import Legend, colour_faces
 from .specimen import Inspection, Specimen
-from .spots import Spot, find_spots
+from .spots import SLIVER, Spot, find_spots
 from .viewpoint import SAMPLES, Visibility, directions, framing, look_round
 
 XRAY_SHARE = 0.1
 """Largest share of a mesh's faces that a hidden finding may have to shine through what is before it; one that lies
 inside always does."""
 
+BEHIND = 0.4
+"""Share of the colour of backs in faces that are coloured for a reason."""
 OUTLINED = 40
 """Most faces of a spot whose sides are drawn."""
 
@@ -44,6 +46,13 @@ class Surface:
     number: int
     source: NDArray[np.int64]
     shining: NDArray[np.bool_]
+
+    @property
+    def backs(self) -> NDArray[np.uint8]:
+        """(m, 3) colours seen from behind: all alike, but for faces that are coloured for a reason."""
+        plain = (self.colours == palette.WALL).all(axis=1, keepdims=True)
+        inside = np.array(palette.INSIDE, float)
+        return np.where(plain, inside, self.colours + BEHIND * (inside - self.colours)).astype(np.uint8)
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,7 +121,7 @@ def put_together(inspection: Inspection, colour: str = "finding") -> Exhibit:
     surfaces = [
         Surface(s.points, s.faces, s.colours, s.number, s.source, shining[s.number][s.source]) for s in surfaces
     ]
-    reach = [s.points[np.unique(s.faces)].astype(float) for s in surfaces if len(s.faces)]
+    reach = _reach(inspection, surfaces)
     for number, specimen in enumerate(inspection.specimens):
         if specimen.cap is not None:
             surfaces.append(_cap(number, specimen, frame))
@@ -121,7 +130,7 @@ def put_together(inspection: Inspection, colour: str = "finding") -> Exhibit:
     strokes += [_outline(s, inspection, frame) for s in spots if 0 < len(s.faces) <= OUTLINED and not len(s.edges)]
     labels: list = []
     if inspection.scene is not None and inspection.scene.path is not None:
-        drawn = scenery.draw(inspection.scene, frame, inspection.specimens)
+        drawn = scenery.draw(inspection.scene, frame, inspection.specimens, np.concatenate(reach))
         strokes += [Strokes(ends, colour, width) for ends, colour, width in drawn.strokes]
         labels += drawn.labels
         reach.append(drawn.reach)
@@ -159,6 +168,17 @@ def _outline(spot: Spot, inspection: Inspection, frame: UnitFrame) -> Strokes:
     return Strokes(sides.astype(np.float32), palette.mixed(spot.colour, palette.INK, 0.25), 2.0)
 
 
+def _reach(inspection: Inspection, surfaces: list[Surface]) -> list[NDArray[np.float64]]:
+    """Points of all that is looked at: where light enters some objects, floors and walls are only around them."""
+    opaque = [s.plan is not None and s.plan.state is None for s in inspection.specimens]
+    some = not all(opaque)
+    return [
+        surface.points[np.unique(surface.faces)].astype(float)
+        for surface in surfaces
+        if len(surface.faces) and not (some and opaque[surface.number])
+    ]
+
+
 def _shining_faces(inspection: Inspection, spots: tuple[Spot, ...]) -> list[NDArray[np.bool_]]:
     """For each mesh its faces of errors and warnings, unless they are a good part of it."""
     shining = [np.zeros(len(specimen.mesh.faces), bool) for specimen in inspection.specimens]
@@ -187,4 +207,4 @@ def _samples(surface: Surface, spot: Spot) -> tuple[NDArray[np.float64], NDArray
     corners = surface.points[surface.faces[place]].astype(float)
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     length = np.linalg.norm(normal, axis=1, keepdims=True)
-    return corners.mean(axis=1), np.divide(normal, length, out=np.zeros_like(normal), where=length > 0)
+    return corners.mean(axis=1), np.divide(normal, length, out=np.zeros_like(normal), where=length > SLIVER)

@@ -14,6 +14,8 @@ from .palette import BACKGROUND, INK, Colour, mixed
 
 RING = 9
 """Least radius of a ring round a finding, pixels, however small the finding and however far."""
+LARGEST = 75
+"""Greatest radius of a ring, pixels."""
 NEAR = 46
 """Labels of one rule that point less far apart than this, pixels, are one."""
 GAP = 4
@@ -72,7 +74,8 @@ def point_at(image: NDArray[np.uint8], pointers: list[Pointer]) -> NDArray[np.ui
         end = np.array([pointer.x, pointer.y])
         reach = np.linalg.norm(end - start)
         if reach > 1:
-            tip = end - (end - start) / reach * min(max(pointer.radius, RING) if pointer.ring else 2, reach)
+            short = max(pointer.radius, RING) if pointer.ring and 1.15 * pointer.radius <= LARGEST else 2
+            tip = end - (end - start) / reach * min(short, reach)
             draw.line([*(2 * start), *(2 * tip)], mixed(pointer.colour, INK, 0.25), 2)
     for box, pointer in placed:
         left, top, right, bottom = (2 * value for value in box)
@@ -82,10 +85,10 @@ def point_at(image: NDArray[np.uint8], pointers: list[Pointer]) -> NDArray[np.ui
 
 
 def _ring(draw: Any, pointer: Pointer) -> None:
-    radius = 2 * min(max(1.15 * pointer.radius, RING), 4000)
-    box = (2 * pointer.x - radius, 2 * pointer.y - radius, 2 * pointer.x + radius, 2 * pointer.y + radius)
-    if radius > 150:
+    radius = 2 * max(1.15 * pointer.radius, RING)
+    if radius > 2 * LARGEST:
         return  # large enough to be seen: a ring would only be in the way
+    box = (2 * pointer.x - radius, 2 * pointer.y - radius, 2 * pointer.x + radius, 2 * pointer.y + radius)
     if not pointer.hidden:
         draw.ellipse(box, None, (255, 255, 255), 9)
         draw.ellipse(box, None, pointer.colour, 5)
@@ -205,13 +208,15 @@ def wrapped(text: str, width: float, size: int) -> list[str]:
     return [*rows, row]
 
 
-def titled(image: NDArray[np.uint8], words: str, colour: Colour) -> NDArray[np.uint8]:
-    """The picture with a coloured frame and a title in its corner."""
+def titled(image: NDArray[np.uint8], words: str, colour: Colour, dots=()) -> NDArray[np.uint8]:
+    """The picture with a coloured frame, a title in its corner, and dots at places (x, y)."""
     from PIL import Image, ImageDraw
 
     picture = Image.fromarray(image)
     draw = ImageDraw.Draw(picture)
     height, width = image.shape[:2]
+    for x, y in dots:
+        draw.ellipse((x - 5, y - 5, x + 5, y + 5), colour, (255, 255, 255), 2)
     draw.rectangle((0, 0, width - 1, height - 1), None, colour, 3)
     draw.rectangle((0, 0, font(13).getlength(words) + 14, 21), colour)
     draw.text((7, 3), words, (255, 255, 255), font(13))

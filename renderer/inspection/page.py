@@ -73,6 +73,7 @@ def _data(exhibit: Exhibit, clip: Clip | None) -> dict[str, Any]:
         "bounds": bounds.tolist(),
         "clip": None if clip is None else {"axis": clip.axis, "limits": list(clip.planes(exhibit))},
         "inside": list(palette.INSIDE),
+        "wall": list(palette.WALL),
         "background": list(palette.BACKGROUND),
     }
 

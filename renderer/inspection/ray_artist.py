@@ -42,7 +42,7 @@ class RayArtist:
         found = np.flatnonzero((hit >= 0) & (leave > enter))
         face = hit[found]
         facing = np.einsum("ij,ij->i", triangles.normals[face], direction[:, found].T)
-        base = np.where((facing < 0)[:, None], triangles.colours[face], np.array(palette.INSIDE, float))
+        base = np.where((facing < 0)[:, None], triangles.colours[face], triangles.backs[face])
         colour[found] = base * (0.35 + 0.65 * np.abs(facing))[:, None]
         depth[found] = (distance[found] + enter[found]) * (view.axes[2] @ direction[:, found])
         return colour.reshape(height, width, 3), depth.reshape(height, width)
@@ -106,6 +106,7 @@ class _Triangles:
         length = np.linalg.norm(normals, axis=1, keepdims=True)
         self.normals = np.divide(normals, length, out=np.zeros_like(normals), where=length > 0)
         self.colours = np.concatenate([surface.colours for surface in surfaces]).astype(float)
+        self.backs = np.concatenate([surface.backs for surface in surfaces]).astype(float)
         self.caster = RayCaster(points, faces)
 
 

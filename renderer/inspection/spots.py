@@ -16,6 +16,9 @@ from .specimen import Inspection, Specimen
 SPOTS = 60
 """Places told apart in one finding, the largest first; the rest share one more."""
 
+SLIVER = 1e-9
+"""Twice the area, in the frame, below which a place has no normal to speak of."""
+
 Indices = NDArray[np.int64]
 
 _URGENCY = {Severity.ERROR: 0, Severity.WARNING: 1, Severity.INFO: 2}
@@ -58,7 +61,7 @@ def find_spots(inspection: Inspection) -> list[Spot]:
     for number, specimen in enumerate(inspection.specimens):
         points = frame.points_in(specimen.mesh.vertices)
         for rule in specimen.findings:
-            spots += _spots(number, specimen, rule, points)
+            spots += _spots(number, specimen, rule, points, frame.scale)
     return sorted(spots, key=lambda spot: (_URGENCY[spot.severity], spot.waived, spot.specimen, spot.code))
 
 
@@ -68,7 +71,7 @@ def faces_of(rule: RuleReport) -> Indices:
     return np.union1d(np.asarray(rule.faces, np.int64), pairs)
 
 
-def _spots(number: int, specimen: Specimen, rule: RuleReport, points: NDArray[np.float64]) -> list[Spot]:
+def _spots(number: int, specimen: Specimen, rule: RuleReport, points, scale: float) -> list[Spot]:
     mesh = specimen.mesh
     faces = faces_of(rule)
     edges = np.asarray(rule.edges, np.int64).reshape(-1, 2)
@@ -106,7 +109,7 @@ def _spots(number: int, specimen: Specimen, rule: RuleReport, points: NDArray[np
             Spot(
                 number, rule.code, rule.name, rule.severity, rule.reason is not None, palette.of_rule(rule),
                 centre, float(np.linalg.norm(places - centre, axis=1).max()),
-                normal / length if 0 < length < np.inf else np.zeros(3),
+                normal / length if SLIVER * scale**2 < length < np.inf else np.zeros(3),
                 its_faces, edges[members] if kind is edges else np.empty((0, 2), np.int64),
                 vertices[members] if kind.shape[1] == 1 else np.empty(0, np.int64),
                 len(order) - SPOTS + 1 if rest else 1,

@@ -154,7 +154,10 @@ def _close_up(exhibit, artist, view, number, size, letter) -> NDArray[np.uint8]:
     near = close_view(exhibit, number, size[0] / size[1], view)
     image = seen_through(artist, near, size).image
     where = " (inside)" if exhibit.inside[number] else ""
-    return titled(image, f"{letter}  {spot.code} {spot.name}{where}", spot.colour)
+    mesh = exhibit.inspection.specimens[spot.specimen].mesh
+    places = near.project(exhibit.frame.points_in(mesh.vertices[spot.vertices[:30]]), size)
+    dots = [(x, y) for x, y, depth in places.tolist() if depth > 0 and 0 <= x < size[0] and 0 <= y < size[1]]
+    return titled(image, f"{letter}  {spot.code} {spot.name}{where}", spot.colour, dots)
 
 
 def _words(exhibit: Exhibit) -> list[Line]:

@@ -86,13 +86,14 @@ uniform int first; out vec3 seen, here; flat out vec3 colour; flat out int face;
 void main() { here = p; colour = c; face = first + gl_VertexID / 3; gl_Position = place(p, seen); }`;
 const MESH_F = CUT + `
 in vec3 seen; flat in vec3 colour; flat in int face;
-uniform float alpha; uniform vec3 inside; uniform bool identify; out vec4 result;
+uniform float alpha; uniform vec3 inside, wall; uniform bool identify; out vec4 result;
 void main() {
   cut();
   if (identify) { result = vec4(float(face & 255), float((face >> 8) & 255), float((face >> 16) & 255), 255) / 255.0; return; }
   vec3 normal = normalize(cross(dFdx(seen), dFdy(seen)));
   float light = 0.35 + 0.65 * abs(dot(normal, normalize(seen)));
-  result = vec4((gl_FrontFacing ? colour : inside) * light, alpha);
+  vec3 back = distance(colour, wall) < 0.01 ? inside : mix(colour, inside, 0.4);
+  result = vec4((gl_FrontFacing ? colour : back) * light, alpha);
 }`;
 const LINE_V = COMMON + `
 layout(location = 0) in vec3 a; layout(location = 1) in vec3 b; layout(location = 2) in vec2 corner;
@@ -190,6 +191,7 @@ function drawMeshes(which, alpha, identify = false) {
   uniforms(meshProgram);
   gl.uniform1f(meshProgram.at.alpha, alpha);
   gl.uniform3fv(meshProgram.at.inside, data.inside.map(value => value / 255));
+  gl.uniform3fv(meshProgram.at.wall, data.wall.map(value => value / 255));
   gl.uniform1i(meshProgram.at.identify, identify);
   for (const mesh of meshes) {
     if (!mesh[which].count) continue;

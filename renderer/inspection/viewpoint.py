@@ -22,6 +22,8 @@ FAVOUR = 0.25
 """How much more, as a share of all spots, another view must show to be taken."""
 SAMPLES = 12
 """Faces of a spot that are asked whether they can be seen."""
+FROM_BEHIND = 0.3
+"""What a face counts whose back is seen."""
 LIFT = 1e-4
 """How far from the surface rays start, unit-size frame."""
 UP = np.array([0.0, 1.0, 0.0])
@@ -131,7 +133,7 @@ class Visibility:
         """The number of the direction from which most can be seen; the first unless another shows clearly more."""
         if not len(self.share) or weights.sum() == 0:
             return 0
-        seen = weights @ (self.share > 0.05) / weights.sum()
+        seen = weights @ np.minimum(2 * self.share, 1) / weights.sum()
         best = int(np.argmax(seen))
         return best if seen[best] > seen[0] + FAVOUR else 0
 
@@ -157,7 +159,8 @@ def look_round(spots: list[Spot], points: NDArray[np.float32], faces: NDArray[np
         origin = np.ascontiguousarray((start + LIFT * side + 1e-5 * view).T, np.float32)
         away = np.ascontiguousarray(np.broadcast_to(view, start.shape).T, np.float32)
         clear = ~caster.occluded(origin, away)
-        share[:, k] = np.bincount(owner, clear, len(spots)) / np.maximum(sizes, 1)
+        seen = np.where(normal @ view < 0, FROM_BEHIND, 1.0) * clear
+        share[:, k] = np.bincount(owner, seen, len(spots)) / np.maximum(sizes, 1)
     return Visibility(share)
 
 

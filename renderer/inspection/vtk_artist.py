@@ -28,11 +28,15 @@ class VtkArtist:
             blank = np.tile(np.array(palette.BACKGROUND, np.uint8), (height, width, 1))
             return Layer(blank, np.full((height, width), np.inf, np.float32))
         look(plotter, view)
-        plotter.reset_camera_clipping_range()
+        # VTK's own choice would cut off what is a thousand times nearer than the farthest
+        distance = float(np.linalg.norm(view.target - view.position))
+        farthest = distance + 4.0
+        plotter.camera.clipping_range = (max(0.02 * distance, distance - 1.5), farthest)
         plotter.render()
         image = np.asarray(plotter.screenshot(return_img=True))[..., :3]
-        depth = -np.asarray(plotter.get_image_depth(), np.float32)  # NaN where nothing is
-        return averaged(image, np.where(np.isfinite(depth), depth, np.inf).astype(np.float32))
+        depth = -np.asarray(plotter.get_image_depth(reset_camera_clipping_range=False), np.float32)
+        # where nothing is: NaN, or the far end with its rounding
+        return averaged(image, np.where(depth < 0.999 * farthest, depth, np.inf).astype(np.float32))
 
     def close(self) -> None:
         """Let go of VTK's windows."""
@@ -91,8 +95,9 @@ def add_surface(plotter: Any, surface: Surface, faces) -> list[Any]:
     }  # fmt: skip
     # VTK gives both sides of a face the same scalars
     front = plotter.add_mesh(body, scalars="colour", rgb=True, culling="back", **common)
-    back = plotter.add_mesh(body.copy(deep=False), scalars=None, color=palette.INSIDE, culling="front", **common)
-    back.mapper.scalar_visibility = False
+    behind = body.copy(deep=False)
+    behind.cell_data["colour"] = surface.backs[faces]
+    back = plotter.add_mesh(behind, scalars="colour", rgb=True, culling="front", **common)
     return [front, back]
 
 

@@ -38,6 +38,7 @@ class Window:
         self.plotter = cast(Any, plotter)
         self.plotter.add_light(pyvista.Light(light_type="headlight"))
         self.plotter.set_background(palette.BACKGROUND)
+        self.plotter.renderer.SetNearClippingPlaneTolerance(1e-5)  # close-ups are near
         self.plotter.render_window.SetMultiSamples(0)  # software takes as long for them as for all the rest
         self._fine: list[Any] = []
         self._coarse: list[Any] = []

@@ -7,6 +7,7 @@ from renderer.inspection import gl, palette
 from renderer.inspection.layer import Clip, seen_through
 from renderer.inspection.ray_artist import RayArtist
 from renderer.inspection.still import close_view, compose
+from renderer.inspection.viewpoint import centred
 from renderer.inspection.vtk_artist import VtkArtist
 from sss_tools import shapes
 from sss_tools.medium import Medium
@@ -82,6 +83,29 @@ def test_depths_are_along_the_line_of_sight(artist_for):
     # the ball has radius 1/2 in the frame; facets, a depth buffer of 24 bits and the pixel beside the middle
     assert layer.depth[100, 120] == pytest.approx(distance - 0.5, abs=2e-3)
     assert np.isinf(layer.depth[0, 0])
+
+
+def test_close_ups_are_not_cut_off_and_their_background_does_not_glow(artist_for):
+    # a dent of a thousandth of the size, a finding inside that shines, nothing behind at the rim of the view
+    shown = exhibit(ball_in_ball())
+    artist = artist_for(shown)
+    for radius in (0.3, 1e-3, 1e-4):
+        view = centred([0.0, 0.2, 1.0], np.array([0.0, 0.1, 0.488]), radius)
+        alone, both = artist.draw(view, SIZE), seen_through(artist, view, SIZE)
+        hidden = np.isfinite(artist.draw(view, SIZE, shining=True).depth)
+        assert np.isfinite(alone.depth[100, 120])
+        # a front, not the violet of backs
+        assert alone.image[100, 120, 0] >= alone.image[100, 120, 2]
+        assert (both.image[~hidden] == alone.image[~hidden]).all()
+
+
+def test_only_what_shines_has_a_depth_among_what_shines(artist_for):
+    # one rim near the camera and one far away: depths of very different size
+    shown = exhibit(shapes.punctured(shapes.icosphere(1.0, 5), [[0.5, 0.3, 0.8], [-0.5, -0.3, -0.8]], 0.02))
+    number = next(k for k, spot in enumerate(shown.spots) if spot.code == "SSS101")
+    layer = artist_for(shown).draw(close_view(shown, number, 1.2), SIZE, shining=True)
+    plain = np.abs(layer.image.astype(int) - palette.BACKGROUND).max(axis=2) < 4
+    assert plain.mean() > 0.3 and np.isinf(layer.depth[plain]).all()
 
 
 def test_a_tiny_hole_has_a_ring_a_label_and_a_close_up():
