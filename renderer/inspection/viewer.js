@@ -60,7 +60,7 @@ function project(point) {
 
 // ---- drawing ----
 
-const gl = canvas.getContext("webgl2", {antialias: true, preserveDrawingBuffer: true});
+const gl = canvas.getContext("webgl2", {alpha: false, antialias: true, preserveDrawingBuffer: true});
 if (!gl) { fail("This browser has no WebGL 2: the table beside is all there is."); return; }
 
 // positions are taken relative to the target before anything else: close-ups stay sharp
