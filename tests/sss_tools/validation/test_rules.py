@@ -6,8 +6,8 @@ import pytest
 from sss_tools import shapes
 from sss_tools.mesh import Mesh
 from sss_tools.validation.outcome import FixSafety, Outcome, Severity
-from sss_tools.validation.rule import all_rules
-from sss_tools.validation.run import LISTED, check_mesh
+from sss_tools.validation.rule import Subject, all_rules
+from sss_tools.validation.run import LISTED, check_mesh, check_subject
 
 CONTRACT = {
     "SSS101": ("open-boundary", "error"),
@@ -332,6 +332,13 @@ def test_long_lists_are_cut_and_say_so():
     result = run(shapes.inverted(ball), "SSS204")
     assert len(ball.faces) > LISTED == len(result.faces) and result.truncated
     assert not run(shapes.inverted(shapes.box()), "SSS204").truncated
+
+
+def test_all_indices_are_listed_where_that_is_wanted():
+    ball = shapes.inverted(shapes.icosphere(1.0, 4))
+    report = check_subject(Subject(ball), listed=None)
+    (result,) = (rule for rule in report.rules if rule.code == "SSS204")
+    assert result.faces == list(range(len(ball.faces))) and not result.truncated
 
 
 def test_indices_are_those_of_the_file_and_not_of_welded_points():
