@@ -41,6 +41,25 @@ def inspection_of(options: Any, warn: Warn) -> Inspection:
     return _of_mesh(path, options, warn)
 
 
+def scene_of(options: Any) -> Scene:
+    """The scene to render: the one of the file, or one around a bare mesh. Raises InputError."""
+    path = Path(options.subject)
+    if path.suffix.lower() == ".toml":
+        _refuse_mesh_options(path, options)
+        from renderer.scene.scene_file import load_scene
+
+        return load_scene(path)
+    from renderer.scene.staging import stage_mesh
+
+    return stage_mesh(_drawable(path), options.material, unit=options.unit or "mm")
+
+
+def _refuse_mesh_options(path: Path, options: Any) -> None:
+    for option in ("material", "unit"):
+        if getattr(options, option) is not None:
+            raise InputError(f"--{option}", "is for meshes without a scene", f"set it in {path}, or leave it out")
+
+
 def _of_mesh(path: Path, options: Any, warn: Warn) -> Inspection:
     from renderer.inspection.specimen import Inspection
 
@@ -86,9 +105,7 @@ def _of_scene(path: Path, options: Any, warn: Warn) -> Inspection:
 
     from .check_scene import SceneMeshes
 
-    for option in ("material", "unit"):
-        if getattr(options, option) is not None:
-            raise InputError(f"--{option}", "is for meshes without a scene", f"set it in {path}, or leave it out")
+    _refuse_mesh_options(path, options)
     scene = load_scene(path)
     specimens = []
     for thing, entry in zip(scene.objects, SceneMeshes(str(path)).all(), strict=True):

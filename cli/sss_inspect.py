@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 
 PROGRAM = "sss-inspect"
 
+LIVE = (640, 480)
+"""Greatest size of the window of ``--live``, pixels."""
 COLOURS = ("finding", "thickness", "shader", "component")
 
 # before NumPy is imported: on a busy machine OpenBLAS's own threads wait for each other longer than they work
@@ -37,6 +39,8 @@ def _inspect(argv: Sequence[str] | None) -> int:
     if options.picture is not None and options.html is None:
         raise InputError("--picture", "goes on a page", "add --html FILE.html, or leave it out")
 
+    if options.live:
+        return _live(options)
     picture = None if options.picture is None else _read_picture(options.picture)
     interactive = options.screenshot is None and options.html is None
     if interactive:
@@ -63,6 +67,26 @@ def _inspect(argv: Sequence[str] | None) -> int:
         Window(exhibit, options.clip).run()
     elif not options.quiet:
         _say(exhibit, options)
+    return 0
+
+
+def _live(options: Any) -> int:
+    """A window with our own picture in it."""
+    for name in ("screenshot", "html", "rule", "clip", "picture"):
+        if getattr(options, name) is not None:
+            raise InputError("--live", f"goes without --{name}", "leave one of them out")
+    _refuse_without_screen()
+    from renderer.inspection.live import Live
+    from renderer.inspection.live_window import LiveWindow
+
+    from .inspect_subject import scene_of
+
+    with progress(1, "building", options.quiet):
+        scene = scene_of(options)
+        width, height = scene.camera.resolution
+        share = min(LIVE[0] / width, LIVE[1] / height)
+        live = Live(scene, (max(round(share * width), 1), max(round(share * height), 1)), options.preview)
+    LiveWindow(live, Path(options.subject).name).run()
     return 0
 
 
@@ -123,6 +147,10 @@ def _parser() -> ArgumentParser:
     add("--screenshot", type=Path, metavar="FILE.png", help="write a still instead of opening a window")
     add("--html", type=Path, metavar="FILE.html", help="write one page with everything in it, to look at or to send")
     add("--picture", type=Path, metavar="FILE.png", help="a render to put on the page")
+    add("--live", action="store_true", help="turn the rendered picture itself: a quick shader while it moves, passes "
+        "of the path shader while it rests")  # fmt: skip
+    add("--preview", choices=("scalar", "plumb"), default="scalar", help="what draws while --live moves "
+        "(default: scalar)")  # fmt: skip
     add("--size", type=_size, default=(1400, 1000), metavar="WxH", help="of the still (default: 1400x1000)")
     add("--material", metavar="NAME|FILE", help="what a mesh is made of: a preset, or a TOML file")
     add("--unit", choices=("mm", "cm", "m", "inch"), help="what one mesh unit is, for --material")

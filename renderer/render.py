@@ -9,7 +9,7 @@ from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from hashlib import blake2b
 from itertools import islice, pairwise
 from queue import Empty, SimpleQueue
@@ -22,7 +22,7 @@ from .output.film import Film
 from .output.image import Picture
 from .scene.admission import admit
 from .scene.camera import CameraRays
-from .scene.description import Scene
+from .scene.description import Camera, Scene
 from .scene.fingerprint import scene_hash
 from .shaders import FAST_SHADERS, diffuse, plumb, selection
 from .shaders.ambient_field import corner_field
@@ -117,6 +117,17 @@ class Renderer:
         self.added = 0
         # their buffers outlive the threads of one ``run``
         self._idle: SimpleQueue[Wavefront | direct.DirectTracer] = SimpleQueue()
+
+    def look_from(self, camera: Camera) -> None:
+        """Begin a new film from another camera; whatever was built for the scene stays.
+
+        The shaders stay those chosen for the first camera. Nobody asks whether the camera is inside an object.
+        """
+        self.scene = replace(self.scene, camera=camera, hash="")
+        self.camera = CameraRays(camera, self.traced.frame)
+        self.shader_id, self.object_id = self._identify()
+        self.film = Film.blank(camera.resolution, "", self.settings.seed)
+        self.added, self._idle = 0, SimpleQueue()
 
     def run(
         self,

@@ -61,11 +61,11 @@ def screen():
 class Driver:
     """The command in a process, and hands on its window."""
 
-    def __init__(self, display: str, *arguments: str):
+    def __init__(self, display: str, *arguments: str, code: str = CODE):
         self.environment = {**os.environ, "DISPLAY": display, "PYTHONPATH": os.pathsep.join(p or "." for p in sys.path)}
         self.environment.pop("VTK_DEFAULT_OPENGL_WINDOW", None)
         self.process = subprocess.Popen(
-            [sys.executable, "-c", CODE, *arguments],
+            [sys.executable, "-c", code, *arguments],
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
             env=self.environment,
@@ -113,6 +113,43 @@ def test_keys_go_from_finding_to_finding_and_a_click_asks_a_face(screen, tmp_pat
         time.sleep(1)
         window.hand("click", "1")
         assert "SSS204 inverted-shell" in window.wait_for("face ")
+        window.hand("key", "q")
+        assert window.process.wait(60) == 0
+    finally:
+        if window.process.poll() is None:
+            window.process.kill()
+        window.process.communicate()
+
+
+def test_the_live_picture_turns_under_the_mouse_and_rests_on_the_reference(screen, tmp_path):
+    path = tmp_path / "ball.ply"
+    write_mesh(shapes.ellipsoid((1.0, 0.7, 0.5), 3), path)
+    code = CODE.replace("renderer.inspection.window import Window", "renderer.inspection.live_window import LiveWindow")
+    live = (
+        code[: code.index("def tell")]
+        + """
+before = LiveWindow._tell
+def tell(self, words):
+    before(self, words)
+    print("told:", words, self.live.camera.position, flush=True)
+LiveWindow._tell = tell
+"""
+        + code[code.index("from cli") :]
+    )
+    window = Driver(screen, str(path), "--live", "-q", code=live)
+    try:
+        window.wait_for("ready")
+        first = window.wait_for("path, 2 passes, standard error")
+        window.hand("mousemove", "240", "240")
+        window.hand("mousedown", "1")
+        for x in (260, 300, 340):
+            window.hand("mousemove", str(x), "230")
+        moving = window.wait_for("pictures/s")
+        window.hand("mouseup", "1")
+        window.hand("click", "4")
+        rest = window.wait_for("path, 2 passes, standard error")
+        places = [line[line.index("[") :] for line in (first, moving, rest)]
+        assert len(set(places)) == 3
         window.hand("key", "q")
         assert window.process.wait(60) == 0
     finally:

@@ -1,0 +1,69 @@
+"""The live picture turns, follows the time it has, and rests on the reference."""
+
+import time
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from renderer.inspection.live import LEAST, Live
+from renderer.render import Renderer, Settings
+from renderer.scene.staging import stage_mesh
+from sss_tools import shapes
+
+
+@pytest.fixture
+def live():
+    made = Live(stage_mesh(shapes.ellipsoid((1.0, 0.7, 0.5), 2)), (96, 64))
+    yield made
+    made.close()
+
+
+def wait_for_passes(live, count: int):
+    limit = time.monotonic() + 120
+    while time.monotonic() < limit:
+        best = live.resting()
+        if best is not None and int(best[1].split()[1]) >= count:
+            return best
+        time.sleep(0.02)
+    raise AssertionError("the reference does not come")
+
+
+def test_turning_keeps_the_distance_and_a_full_turn_comes_back(live):
+    first = live.camera.position.copy()
+    distance = np.linalg.norm(first - live.camera.target)
+    for _ in range(8):
+        live.turn(np.pi / 4, 0.0)
+        assert np.linalg.norm(live.camera.position - live.camera.target) == pytest.approx(distance)
+    assert np.allclose(live.camera.position, first)
+    live.turn(0.0, 0.3)
+    assert live.camera.position[1] > first[1]
+    live.turn(0.0, 10.0)
+    assert live.camera.position[1] - live.camera.target[1] == pytest.approx(distance * np.sin(1.5))
+
+
+def test_the_preview_is_of_the_window_s_size_and_grows_no_finer_than_time_allows(live, monkeypatch):
+    assert live.moving().shape == (64, 96, 3) and live._rows >= LEAST
+    monkeypatch.setattr("renderer.inspection.live.FRAME", 1e-9)
+    for _ in range(5):
+        live.moving()
+    assert live._rows == LEAST
+
+
+def test_at_rest_passes_of_the_reference_add_up_and_say_their_error(live):
+    image, words = wait_for_passes(live, 3)
+    assert image.shape == (64, 96, 3) and words.startswith("path, ") and "standard error" in words
+
+
+def test_a_movement_ends_the_film_and_the_next_is_of_the_new_camera(live):
+    wait_for_passes(live, 1)
+    live.turn(0.7, 0.2)
+    wait_for_passes(live, 2)
+    live.close()
+    film = live._exact.film
+    staged = stage_mesh(shapes.ellipsoid((1.0, 0.7, 0.5), 2))
+    again = Renderer(replace(staged, camera=replace(staged.camera, resolution=(96, 64))), Settings(shader="path"))
+    again.look_from(live.camera)
+    again.run(range(film.passes))
+    # the same passes from the same camera are the same samples
+    assert np.array_equal(again.film.mean(), film.mean())
