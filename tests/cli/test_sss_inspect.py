@@ -154,3 +154,9 @@ def test_what_cannot_be_looked_at_is_refused_in_one_line(workplace, capsys, case
     assert sss_inspect.main(arguments) == 2
     assert words in one_line(capsys.readouterr())
     assert not Path("a.png").exists() and not Path("a.html").exists()
+
+
+@pytest.mark.parametrize("more", [["--screenshot", "a.png"], ["--rule", "SSS101"], ["--clip", "x"]])
+def test_live_goes_without_what_it_would_ignore(workplace, capsys, more):
+    assert sss_inspect.main(["ball.ply", "--live", *more]) == 2
+    assert f"goes without {more[0]}" in one_line(capsys.readouterr())
