@@ -172,12 +172,17 @@ class Frames:
     """What is the same in all frames of a scene; threads share it."""
 
     def __init__(self, scene: TracedScene, camera: CameraRays, bodies: Mapping[int, FastBody], seed: int):
-        self.scene, self.camera, self.bodies, self.seed = scene, camera, bodies, seed
+        self.scene, self.bodies, self.seed = scene, bodies, seed
         self.table = FaceTable(scene, bodies)
+        self.look_from(camera)
+
+    def look_from(self, camera: CameraRays) -> None:
+        """Go on with another camera; no frame may be under way."""
+        self.camera = camera
         width, height = camera.resolution
         self.covered = np.ones(width * height, bool)
-        if not scene.lights.spheres:
-            self.covered = covered_pixels(camera, scene.vertices, scene.triangles)
+        if not self.scene.lights.spheres:
+            self.covered = covered_pixels(camera, self.scene.vertices, self.scene.triangles)
 
 
 class DirectTracer:

@@ -125,6 +125,8 @@ class Renderer:
         """
         self.scene = replace(self.scene, camera=camera, hash="")
         self.camera = CameraRays(camera, self.traced.frame)
+        if self._frames is not None:
+            self._frames.look_from(self.camera)
         self.shader_id, self.object_id = self._identify()
         self.film = Film.blank(camera.resolution, "", self.settings.seed)
         self.added, self._idle = 0, SimpleQueue()

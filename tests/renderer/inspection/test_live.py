@@ -50,6 +50,21 @@ def test_the_preview_is_of_the_window_s_size_and_grows_no_finer_than_time_allows
     assert live._rows == LEAST
 
 
+@pytest.mark.parametrize("preview", ["scalar", "plumb"])
+def test_the_preview_is_seen_from_where_the_camera_is(preview):
+    staged = stage_mesh(shapes.ellipsoid((1.0, 0.7, 0.5), 2))
+    turning = Live(staged, (96, 64), preview)
+    turning._rows = 64
+    before = turning.moving()
+    turning.turn(0.7, 0.2)
+    turning._rows = 64
+    after = turning.moving()
+    assert (before != after).any()
+    fresh = Live(replace(staged, camera=turning.camera), (96, 64), preview)
+    fresh._rows = 64
+    assert np.array_equal(fresh.moving(), after)
+
+
 def test_at_rest_passes_of_the_reference_add_up_and_say_their_error(live):
     image, words = wait_for_passes(live, 3)
     assert image.shape == (64, 96, 3) and words.startswith("path, ") and "standard error" in words
