@@ -151,8 +151,6 @@ def _refuse(options: Any) -> None:
     """Say no to what this version does not do yet, and to options that would be ignored."""
     if options.scheduler is not None:
         raise unavailable("--scheduler")
-    if options.hole_handling == "cap":
-        raise unavailable("--hole-handling cap", "use terminate")
     if options.adaptive and options.pass_range is not None:
         raise InputError("--adaptive", "decides later passes by earlier ones, so it has no part of a render to itself",
                          "leave out --pass-range, or --adaptive")  # fmt: skip
@@ -222,15 +220,17 @@ def _budget(options: Any, started: float) -> Budget:
 
 def _explain(renderer: Renderer) -> None:
     """Print the verdict on each object, what is done at holes, the shader and why."""
-    for thing, plan in zip(renderer.scene.objects, renderer.plans, strict=True):
+    for thing, plan, hole in zip(renderer.scene.objects, renderer.plans, renderer.holes, strict=True):
         if plan.state is None:
             print(f"{plan.name}: {plan.shader}")
             continue
         closedness = thing.closedness
         assert closedness is not None
+        expected = "" if not hole.expected_error else f", {100 * hole.expected_error:.2g} % error expected of it"
         holes = f", {closedness.boundary_loops} boundary loop(s)" if closedness.boundary_loops else ""
         print(
-            f"{plan.name}: {plan.state}{holes} ({renderer.sources[plan.name]}); hole handling {plan.hole_handling}; "
+            f"{plan.name}: {plan.state}{holes} ({renderer.sources[plan.name]}); "
+            f"hole handling {plan.hole_handling}{expected}; "
             f"shader {plan.shader} at distance {plan.distance:.4g}: {plan.reason}"
         )
 

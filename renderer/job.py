@@ -22,6 +22,7 @@ from .output.film import Film
 from .output.image import Picture
 from .render import Renderer
 from .scene.description import DirectionalLight, PointLight, RectangleLight, SceneObject, SphereLight, Translucent
+from .scene.holes import HoleReport, in_mesh_units
 
 DEFAULT_PASSES = 64
 REFRESH_EVERY, REFRESH_SHARE = 1.0, 0.05
@@ -32,6 +33,8 @@ four 8 %."""
 LEAK_BUDGET, LOSS_BUDGET = 1e-5, 1e-3
 """Share of the paths that may contradict a closed surface, and that may be lost at holes, before it is worth a
 warning."""
+MUCH_LEAKED = 1e-3
+"""Share of the paths from which on leaks of one object show."""
 
 
 @dataclass(frozen=True)
@@ -227,12 +230,9 @@ def rare_event_warnings(renderer: Renderer) -> list[str]:
     """What the user should know of rare events that were not rare enough."""
     tally = renderer.tally
     found = []
-    if _beyond(tally.leaked, LEAK_BUDGET * tally.samples):
-        found.append(
-            f"{tally.leaked} of {tally.samples} paths ({tally.leaked / tally.samples:.1e}; {LEAK_BUDGET:.0e} would be "
-            "usual) contradicted a surface taken for closed; check the mesh with sss-check, or use "
-            "--hole-handling terminate"
-        )
+    for index, (leaked, *place) in sorted(tally.leaks.items()):
+        if _beyond(int(leaked), LEAK_BUDGET * tally.samples):
+            found.append(_leak_warning(renderer, index, int(leaked), np.array(place) / leaked))
     if _beyond(tally.terminated, LOSS_BUDGET * tally.samples):
         found.append(
             f"{tally.terminated} of {tally.samples} paths ({tally.terminated / tally.samples:.1e}) ended at holes, "
@@ -242,6 +242,18 @@ def rare_event_warnings(renderer: Renderer) -> list[str]:
         share = renderer.film.non_finite / max(renderer.film.hits.size * renderer.film.passes, 1)
         found.append(f"{renderer.film.non_finite} samples ({share:.1e} of all) were not finite and are left out")
     return found
+
+
+def _leak_warning(renderer: Renderer, index: int, leaked: int, place: NDArray) -> str:
+    """What is said of an object with so many leaks; ``place`` is their mean, in the frame of the tracer."""
+    thing, samples = renderer.scene.objects[index], renderer.tally.samples
+    x, y, z = in_mesh_units(thing, renderer.traced.frame.points_out(place)[None])[0]
+    much = "" if leaked <= MUCH_LEAKED * samples else ": light there is wrong"
+    return (
+        f"{thing.name}: {leaked} of {samples} paths ({leaked / samples:.1e}; {LEAK_BUDGET:.0e} would be usual) "
+        f"contradicted a surface taken for closed, in the mean at ({x:.4g}, {y:.4g}, {z:.4g}) in the mesh's "
+        f"units{much}; check the mesh with sss-check, or use --hole-handling terminate"
+    )
 
 
 def _beyond(count: int, expected: float) -> bool:
@@ -255,7 +267,7 @@ def report(
     """The JSON object of ``--report``; ``total`` wall seconds of the command."""
     film, tally, seconds = picture.film, renderer.tally, renderer.stages.seconds
     error = film.mean_relative_stderr()
-    stages = {name: seconds.get(name, 0.0) for name in ("load", "check", "build", "render", "write")}
+    stages = {name: seconds.get(name, 0.0) for name in ("load", "check", "close", "build", "render", "write")}
     rendered_now = max(renderer.added, 1)
     target = None if budget is None else budget.target_error
     return {
@@ -263,7 +275,9 @@ def report(
         "version": version,
         "scene_hash": film.scene_hash,
         "seed": film.seed,
-        "objects": [asdict(plan) for plan in renderer.plans],
+        "objects": [
+            {**asdict(plan), "holes": _holes(hole)} for plan, hole in zip(renderer.plans, renderer.holes, strict=True)
+        ],
         "passes": film.passes,
         "pass_ranges": [list(span) for span in film.ranges],
         "seconds": {"total": total, **stages, "frame": stages["render"] / rendered_now},
@@ -283,6 +297,11 @@ def report(
         "light_methods": light_methods(renderer),
         "peak_memory": peak_memory(),
     }
+
+
+def _holes(hole: HoleReport) -> dict[str, Any]:
+    """Of the report on an object's holes, what its plan does not say."""
+    return {name: value for name, value in asdict(hole).items() if name not in ("handling", "reason")}
 
 
 def light_methods(renderer: Renderer) -> list[dict[str, str]]:

@@ -24,6 +24,7 @@ from .scene.admission import admit
 from .scene.camera import CameraRays
 from .scene.description import Camera, Scene
 from .scene.fingerprint import scene_hash
+from .scene.holes import close_holes
 from .shaders import FAST_SHADERS, diffuse, plumb, selection
 from .shaders.ambient_field import corner_field
 from .shaders.fast_body import FastBody
@@ -84,7 +85,9 @@ class Stages:
 class Renderer:
     """A scene made ready: checked, shaders chosen, ray caster and tables built.
 
+    scene    as it was given, its objects checked
     plans    what is done with each object, and why
+    holes    what was done at the holes of each object
     sources  by object name, where the verdict on its mesh comes from
     film     the passes so far
     added    how many of them this renderer made
@@ -101,10 +104,16 @@ class Renderer:
         self.plans = selection.select(checked, settings.quality, settings.shader, settings.hole_handling, passes)
         self.scene = checked
         keep_freed_memory()
+        shaders = [plan.shader for plan in self.plans]
+        with self.stages.stage("close"):
+            handling, reasons = zip(*((plan.hole_handling, plan.reason) for plan in self.plans), strict=True)
+            closed, self.holes = close_holes(self.scene, shaders, handling, reasons)
+        self.plans = [
+            replace(plan, hole_handling=hole.handling, reason=hole.reason)
+            for plan, hole in zip(self.plans, self.holes, strict=True)
+        ]
         with self.stages.stage("build"):
-            self.traced = TracedScene(
-                self.scene, [plan.shader for plan in self.plans], [plan.hole_handling for plan in self.plans]
-            )
+            self.traced = TracedScene(closed, shaders, [plan.hole_handling for plan in self.plans])
             self.camera = CameraRays(scene.camera, self.traced.frame)
             width, height = scene.camera.resolution
             self._fast_bodies = _fast_bodies(self.traced, width * height, settings.threads or os.cpu_count() or 1)

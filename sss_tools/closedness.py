@@ -90,6 +90,11 @@ class Closedness:
     hole_area_fraction: float
     hole_handling: Handling
 
+    @property
+    def flagged(self) -> bool:
+        """Whether counting surfaces may find more than one solid in a place."""
+        return not (self.manifold and self.oriented) or self.internal_geometry or bool(self.self_intersecting)
+
     def to_json(self) -> dict[str, Any]:
         """As CONTRACTS section 2 has it: plain numbers, lists and strings."""
         return asdict(self)

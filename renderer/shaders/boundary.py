@@ -58,7 +58,7 @@ def meet_boundary(
         for slot in np.unique(at.slot[lost]):
             mine = index[lost & (at.slot == slot)]
             lose(scene, paths, mine, int(slot), uniforms, tally, radiance)
-            if scene.translucent[slot].hole_handling == "strict":
+            if scene.translucent[slot].taken_for_closed:
                 tally.contradicted += len(mine)
         at = at.take(np.flatnonzero(~lost))
     if not len(at.index):

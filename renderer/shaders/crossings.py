@@ -78,5 +78,5 @@ class Crossings:
         """
         counted = np.take_along_axis(self.inside_before, self.slot[None], axis=0)[0]
         entering = np.take_along_axis(self.inside_beyond, self.slot[None], axis=0)[0] > counted
-        overlaps = np.array([thing.hole_handling != "strict" and thing.shells_add_up for thing in scene.translucent])
+        overlaps = np.array([thing.shells_add_up for thing in scene.translucent])
         return np.where(entering, (counted > 0) & ~overlaps[self.slot], counted <= 0)

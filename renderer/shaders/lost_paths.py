@@ -31,7 +31,8 @@ def lose(
     patch = patch_radiance(scene, paths.origin[:, index], facing, lambda: uniforms.draw_at(paths.stream, index))
     radiance[:, paths.sample[index]] += paths.throughput[:, index] * thing.colour * patch
     paths.alive[index] = False
-    if thing.hole_handling == "strict":
-        tally.leaked += len(index)
+    if thing.taken_for_closed:
+        # beyond the box only chance tells how far a path went
+        tally.leak(thing.index, np.clip(paths.origin[:, index], thing.lower, thing.upper))
     else:
         tally.terminated += len(index)

@@ -171,13 +171,14 @@ def _handling(thing: SceneObject, wish: str) -> tuple[str, str]:
     assert thing.closedness is not None
     if wish == "auto":
         wish = thing.hole_handling
+    if wish == "cap" and thing.closedness.state == "open":
+        return "surface", "caps asked for, and the mesh encloses no volume to close"
     if wish != "auto":
         return wish, "hole handling asked for"
     recorded, state = thing.closedness.hole_handling, thing.closedness.state
-    if recorded == "cap":
-        return "terminate", f"{len(thing.closedness.holes)} hole(s): paths that leave take the material's colour"
     because = {
         "strict": "closed, manifold and oriented",
+        "cap": f"{len(thing.closedness.holes)} hole(s), closed for light by caps",
         "terminate": f"state {state} with flaws: paths that contradict the surface take the material's colour",
         "surface": "open",
     }

@@ -36,8 +36,9 @@ class TracedObject:
     reflected_share  probability of following the reflection at the boundary, NaN: the reflectance
     colour         (3, 1) reflectance of opaque objects, diffuse reflectance of the media of translucent ones
     shader         "path", "plumb", "scalar" or "diffuse" for translucent objects, "opaque" or "mirror"
-    hole_handling  "strict", "terminate" or "surface"
-    shells_add_up  closed but flagged: surfaces inside the solid are counted, not taken for holes
+    hole_handling  "strict", "cap", "terminate" or "surface"
+    shells_add_up  closed (by caps, it may be) but flagged: surfaces inside the solid are counted, not taken for holes
+    taken_for_closed  what contradicts its surface is a leak, not a hole
     lower, upper   (3, 1) bounding box in the frame
     """
 
@@ -50,6 +51,7 @@ class TracedObject:
     shader: str
     hole_handling: str
     shells_add_up: bool
+    taken_for_closed: bool
     lower: Float32
     upper: Float32
 
@@ -156,7 +158,9 @@ class TracedScene:
         else:
             medium, roughness, colour = None, 0.0, material.reflectance
         bounds = Mesh(points, thing.mesh.faces).bounds.astype(np.float32)
-        shells_add_up = thing.closedness is not None and thing.closedness.state == "closed"
+        closedness = thing.closedness
+        closed = closedness is not None and closedness.state == "closed"
+        shells_add_up = closedness is not None and closed and handling != "strict" and closedness.flagged
         first = sum(len(other.mesh.faces) for other in self.scene.objects[:index])
         return TracedObject(
             index=index,
@@ -168,6 +172,7 @@ class TracedScene:
             shader=shader,
             hole_handling=handling,
             shells_add_up=shells_add_up,
+            taken_for_closed=handling == "strict" or (handling == "cap" and closed),
             lower=bounds[0][:, None],
             upper=bounds[1][:, None],
         )

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..enclosure import ENCLOSES
+from ..topology import Topology
 from .draft import Declined, Draft
 from .fairing import fair, refine
 from .judge import count_crossing_faces
@@ -125,15 +126,11 @@ def _with_caps(draft: Draft, loops: list[NDArray[np.int64]], smooth: bool) -> Dr
     chords = topology.edges[on_rim[topology.edges].all(axis=1)]
     rim_face = _face_of_edge(topology)
     for loop in loops:
-        cap = triangulate_loop(topology.points[loop], _existing_chords(loop, chords))
+        cap = cap_loop(topology, loop, chords, smooth)
         if cap is None:
             refused += 1
             continue
-        triangles, is_flat = cap
-        corners = topology.points[loop]
-        if smooth and not is_flat and len(loop) >= SMOOTH_FROM:
-            corners, triangles = refine(corners, triangles)
-            corners = fair(corners, triangles, len(loop), topology, loop)
+        corners, triangles = cap
         number = np.concatenate([loop, count + np.arange(len(corners) - len(loop))])
         points.append(corners[len(loop) :])
         faces.append(number[triangles])
@@ -143,6 +140,26 @@ def _with_caps(draft: Draft, loops: list[NDArray[np.int64]], smooth: bool) -> Dr
         added += len(triangles)
     what = f"{len(loops) - refused} of {len(loops)} holes capped with {added} faces"
     return Draft(draft.source, np.concatenate(points), np.concatenate(faces), np.concatenate(birth), what)
+
+
+def cap_loop(
+    topology: Topology, loop: NDArray[np.int64], chords: NDArray[np.int64], smooth: bool
+) -> tuple[NDArray[np.float64], NDArray[np.int64]] | None:
+    """A cap: corners (k, 3), those of the loop first, and triangles over them; None where there is none.
+
+    loop    points in the direction in which the cap's faces run round it
+    chords  (c, 2) pairs of points that are joined already
+    smooth  refine and fair the caps of curved loops of ``SMOOTH_FROM`` edges and more
+    """
+    cap = triangulate_loop(topology.points[loop], _existing_chords(loop, chords))
+    if cap is None:
+        return None
+    triangles, is_flat = cap
+    corners = topology.points[loop]
+    if smooth and not is_flat and len(loop) >= SMOOTH_FROM:
+        corners, triangles = refine(corners, triangles)
+        corners = fair(corners, triangles, len(loop), topology, loop)
+    return corners, triangles
 
 
 def _edges(faces: NDArray[np.int64]) -> NDArray[np.int64]:

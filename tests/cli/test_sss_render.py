@@ -92,7 +92,7 @@ def test_the_report_has_the_fields_of_the_contract(workplace):
     assert wanted <= set(thing)
     assert (thing["name"], thing["state"], thing["hole_handling"]) == ("ball", "closed", "strict")
     seconds = report["seconds"]
-    assert set(seconds) == {"total", "load", "check", "build", "render", "write", "frame"}
+    assert set(seconds) == {"total", "load", "check", "close", "build", "render", "write", "frame"}
     assert seconds["frame"] == pytest.approx(seconds["render"] / 2)
     assert seconds["total"] >= sum(seconds[name] for name in ("load", "check", "build", "render", "write"))
     assert report["rays"] > 0 and report["bounces"] > 0 and report["peak_memory"] > 10_000_000
@@ -293,7 +293,12 @@ def test_ctrl_c_leaves_a_picture_of_whole_passes_and_status_130(workplace, start
     ("mesh", "state", "handling", "because"),
     [
         (shapes.icosphere(1.0, 2), "closed", "strict", "closed, manifold and oriented"),
-        (shapes.punctured(shapes.icosphere(1.0, 3), [[0, 1, 0]], 0.2), "holes", "terminate", "1 hole(s): paths that"),
+        (
+            shapes.punctured(shapes.icosphere(1.0, 3), [[0, 1, 0]], 0.2),
+            "holes",
+            "cap",
+            "1 hole(s), closed for light by caps",
+        ),
         (shapes.with_internal(shapes.icosphere(1.0, 2), (0, 0, 0), 0.4, 1), "closed", "terminate", "with flaws"),
         (shapes.punctured(shapes.icosphere(1.0, 3), [[0, 1, 0]], 1.85), "open", "surface", "encloses no volume"),
     ],
@@ -322,7 +327,8 @@ def test_a_shader_forced_on_what_has_no_inside_becomes_the_diffuse_fallback_with
 
 def test_paths_that_leave_through_a_hole_are_counted(workplace):
     write_mesh(shapes.punctured(shapes.icosphere(1.0, 3), [[0, 1, 0]], 0.4), "ball.ply")
-    assert reported("--passes", 4, "--shader", "path")["rare_events"]["terminated_at_holes"] > 0
+    rule = ("--hole-handling", "terminate")
+    assert reported("--passes", 4, "--shader", "path", *rule)["rare_events"]["terminated_at_holes"] > 0
     forced = reported("--passes", 4, "--shader", "path", "--hole-handling", "strict")
     assert forced["objects"][0]["hole_handling"] == "strict" and forced["rare_events"]["leaked_rays"] > 0
 
@@ -334,8 +340,8 @@ def test_leaks_and_losses_are_warned_of_beyond_their_budgets(workplace, capsys):
     events = report["rare_events"]
     assert 0 < events["parity_contradictions"] <= events["leaked_rays"]
     error = capsys.readouterr().err
-    assert f"warning: {events['leaked_rays']} of {8 * 480} paths (" in error and "taken for closed" in error
-    lost = reported("--passes", 8)["rare_events"]["terminated_at_holes"]
+    assert f"warning: ball: {events['leaked_rays']} of {8 * 480} paths (" in error and "taken for closed" in error
+    lost = reported("--passes", 8, "--hole-handling", "terminate")["rare_events"]["terminated_at_holes"]
     assert f"warning: {lost} of {8 * 480} paths (" in capsys.readouterr().err
     write_mesh(shapes.icosphere(1.0, 3), "ball.ply")
     reported("--passes", 8)
@@ -403,8 +409,7 @@ def test_real_meshes_are_checked_and_rendered(shared, tmp_path, capsys, name):
     assert main([mesh, "-o", str(out), "--size", "32x32", "--passes", "2", "--report", str(report_path)]) == 0
     (thing,) = json.loads(report_path.read_text())["objects"]
     assert thing["state"] == verdict["closedness"]["state"]
-    expected = verdict["closedness"]["hole_handling"]
-    assert thing["hole_handling"] == {"cap": "terminate"}.get(expected, expected)
+    assert thing["hole_handling"] == verdict["closedness"]["hole_handling"]
     with np.load(out) as arrays:
         assert np.isfinite(arrays["image"]).all()
         # the mesh is framed: it fills a good part of the picture, and is not black

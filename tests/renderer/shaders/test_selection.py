@@ -154,12 +154,14 @@ def test_what_is_asked_for_is_done_and_the_user_comes_before_the_scene():
 def test_hole_handling_comes_from_the_verdict_the_scene_or_the_user():
     holed = shapes.punctured(shapes.icosphere(1.0, 3), [[0, 1, 0]], 0.2)
     shelled = shapes.with_internal(BALL, (0, 0, 0), 0.4, 1)
-    for mesh, state, handling in ((BALL, "closed", "strict"), (holed, "holes", "terminate"),
+    for mesh, state, handling in ((BALL, "closed", "strict"), (holed, "holes", "cap"),
                                   (shelled, "closed", "terminate")):  # fmt: skip
         (plan,) = select(ball_at(5, mesh=mesh))
         assert (plan.state, plan.hole_handling) == (state, handling)
     (plan,) = select(ball_at(5, mesh=holed, hole_handling="strict"))
     assert plan.hole_handling == "strict" and "hole handling asked for" in plan.reason
+    (plan,) = select(ball_at(5, mesh=holed, hole_handling="terminate"))
+    assert plan.hole_handling == "terminate"
     (plan,) = select(ball_at(5, mesh=holed, hole_handling="strict"), hole_handling="surface")
     assert (plan.hole_handling, plan.shader) == ("surface", "diffuse")
 

@@ -1,0 +1,216 @@
+"""Holes closed for light alone: a mesh with caps on its boundary loops, made for a ray tracer and never written.
+
+Faces are turned so that solids face outwards, every loop of what encloses a volume gets a cap that faces as the
+surface around it does, and the loop is measured as light inside sees it. A cap that would pass through the surface it
+closes, or through another cap of it, is left out: there a count of the surfaces around a place would say less than
+outside. One that passes through other components stays, as solids that overlap count as one.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .intersection import self_intersections
+from .mesh import Mesh
+from .rays import RayCaster, UnitFrame
+from .repair.draft import Draft
+from .repair.holes import cap_loop, missing_loops
+from .repair.orientation import orient
+from .winding import winding_numbers
+
+Float64 = NDArray[np.float64]
+Indices = NDArray[np.int64]
+
+_AWAY = 1e-4
+"""How far behind a cap the ray starts that measures the room there, as a share of the mesh's longest side."""
+
+
+@dataclass(frozen=True, eq=False)
+class Loop:
+    """A boundary loop of what encloses a volume.
+
+    edges       how many
+    centroid    (3,) of its cap, or of its points where it has none, mesh units
+    half_angle  degrees: of the cone with the solid angle that the loop takes of the sphere around the middle of the
+                room behind it; NaN where it spans no area
+    radius      half the depth of that room, mesh units
+    capped      whether ``Sealed.mesh`` closes it
+    """
+
+    edges: int
+    centroid: Float64
+    half_angle: float
+    radius: float
+    capped: bool
+
+
+@dataclass(frozen=True, eq=False)
+class Sealed:
+    """A mesh as light shall meet it.
+
+    mesh    the faces of the original in their order, some of them turned; then those of the caps
+    faces   how many of them are the original's
+    turned  how many were turned
+    overlapping  whether caps pass through other components
+    loops   all loops, capped or not
+    """
+
+    mesh: Mesh
+    faces: int
+    turned: int
+    overlapping: bool
+    loops: tuple[Loop, ...]
+
+    @property
+    def closed(self) -> bool:
+        """Whether every loop has its cap, and no open sheet is left."""
+        return all(loop.capped for loop in self.loops) and len(self.mesh.topology.boundary_edges) == 0
+
+
+@dataclass(frozen=True, eq=False)
+class _Cap:
+    """Corners (k, 3), those of the loop first, and triangles over them."""
+
+    loop: Indices
+    corners: Float64
+    triangles: Indices
+
+
+def seal(mesh: Mesh, caps: bool = True) -> Sealed:
+    """The mesh with its solids turned outwards and, where ``caps`` says so, caps on the loops that can have one.
+
+    Without caps the loops are measured all the same. Raises ValueError for a mesh without faces or with coordinates
+    that are not finite.
+    """
+    draft = Draft.of(mesh)
+    upright = orient(draft) or draft
+    loops = missing_loops(upright)
+    turned = int((upright.faces != draft.faces).any(axis=1).sum())
+    body = upright.mesh
+    made = _caps(upright, loops, smooth=True)
+    crossing, overlapping = _crossing(body, made)
+    if crossing.any():
+        plain = _caps(upright, loops, smooth=False)
+        made = [simple if crosses else cap for cap, simple, crosses in zip(made, plain, crossing, strict=True)]
+        crossing, overlapping = _crossing(body, made)
+    measures = [_measured(loop, body.topology.points) for loop in loops]
+    if loops:
+        measures = _seen_from_inside(body, made, measures)
+    kept = [cap if caps and not crosses else None for cap, crosses in zip(made, crossing, strict=True)]
+    described = tuple(
+        Loop(len(loop), *measure, cap is not None) for loop, measure, cap in zip(loops, measures, kept, strict=True)
+    )
+    return Sealed(_joined(body, kept), len(body.faces), turned, overlapping, described)
+
+
+def _caps(draft: Draft, loops: list[Indices], smooth: bool) -> list[_Cap | None]:
+    """A cap for each loop; None where it cannot be triangulated."""
+    topology, made = draft.topology, []
+    on_rim = np.zeros(len(topology.points), bool)
+    for loop in loops:
+        on_rim[loop] = True
+    chords = topology.edges[on_rim[topology.edges].all(axis=1)]
+    for loop in loops:
+        cap = cap_loop(topology, loop, chords, smooth)
+        made.append(None if cap is None else _Cap(loop, *cap))
+        if cap is not None:
+            # points of the rim alone: no other cap knows the new ones
+            rim = cap[1][(cap[1] < len(loop)).all(axis=1)]
+            sides = np.concatenate([rim[:, [0, 1]], rim[:, [1, 2]], rim[:, [2, 0]]])
+            chords = np.concatenate([chords, loop[sides]])
+    return made
+
+
+def _joined(body: Mesh, caps: list[_Cap | None]) -> Mesh:
+    """The body, its exactly equal positions taken as one, and the caps after it."""
+    topology = body.topology
+    points, faces, count = [topology.points], [topology.faces], len(topology.points)
+    for cap in caps:
+        if cap is None:
+            continue
+        new = len(cap.corners) - len(cap.loop)
+        number = np.concatenate([cap.loop, count + np.arange(new)])
+        points.append(cap.corners[len(cap.loop) :])
+        faces.append(number[cap.triangles])
+        count += new
+    return Mesh(np.concatenate(points), np.concatenate(faces))
+
+
+def _crossing(body: Mesh, caps: list[_Cap | None]) -> tuple[NDArray[np.bool_], bool]:
+    """(loops,) whether a cap passes through the component whose hole it closes, or is none; of two caps of one
+    component that pass through each other, the larger one. And whether any cap passes through another component.
+
+    The latter does no harm: shells that are closed each for themselves add up to a union.
+    """
+    crosses = np.array([cap is None for cap in caps], bool)
+    present = [cap for cap in caps if cap is not None]
+    if not present:
+        return crosses, False
+    whole = _joined(body, caps)
+    owner = np.full(len(whole.faces), -1)
+    owner[len(body.faces) :] = np.repeat(np.flatnonzero(~crosses), [len(cap.triangles) for cap in present])
+    component = whole.topology.component_of_face
+    # only what shares a cap's box can meet it
+    corners = whole.vertices[whole.faces]
+    lower, upper = corners.min(axis=1), corners.max(axis=1)
+    near = owner >= 0
+    for cap in present:
+        near |= ((lower <= cap.corners.max(axis=0)) & (upper >= cap.corners.min(axis=0))).all(axis=1)
+    faces = np.flatnonzero(near)
+    pairs = faces[self_intersections(Mesh(whole.vertices, whole.faces[faces]).topology)]
+    pairs = pairs[(owner[pairs] >= 0).any(axis=1)]
+    own = component[pairs[:, 0]] == component[pairs[:, 1]]
+    first, second = owner[pairs[own]].T
+    crosses[first[second < 0]] = crosses[second[first < 0]] = True
+    size = [0.0 if cap is None else float(np.ptp(cap.corners, axis=0).max()) for cap in caps]
+    for one, other in zip(first.tolist(), second.tolist(), strict=True):
+        if one >= 0 and other >= 0 and not (crosses[one] or crosses[other]):
+            crosses[max(one, other, key=size.__getitem__)] = True
+    return crosses, not own.all()
+
+
+def _measured(loop: Indices, points: Float64) -> tuple[Float64, float, float]:
+    """What a loop is without a cap: its middle, no angle, half its width."""
+    corners = points[loop]
+    middle = corners.mean(axis=0)
+    return middle, np.nan, float(np.linalg.norm(corners - middle, axis=1).max())
+
+
+def _seen_from_inside(body: Mesh, caps: list[_Cap | None], measures: list) -> list[tuple[Float64, float, float]]:
+    """Middle, half angle and radius of each loop that has a triangulation; the others' as given.
+
+    The room behind a cap reaches from its middle, straight in, to the next surface: in a ball that is its diameter.
+    """
+    frame = UnitFrame.around(*body.bounds)
+    which = [k for k, cap in enumerate(caps) if cap is not None]
+    vectors, middles = [], []
+    for k in which:
+        a, b, c = (caps[k].corners[caps[k].triangles[:, side]] for side in range(3))  # type: ignore[union-attr]
+        normals = np.cross(b - a, c - a)
+        areas = np.linalg.norm(normals, axis=1)
+        vectors.append(normals.sum(axis=0))
+        middles.append(areas @ ((a + b + c) / 3) / max(areas.sum(), 1e-300))
+    size = np.linalg.norm(vectors, axis=1) if which else np.zeros(0)
+    which = [k for k, each in zip(which, size, strict=True) if each > 0]
+    if not which:
+        return measures
+    inwards = -np.array(vectors)[size > 0] / size[size > 0, None]
+    centre = np.array(middles)[size > 0]
+    inside = frame.points_in(centre) + _AWAY * inwards
+    distance, hit = RayCaster(frame.points_in(body.vertices), body.faces).closest(
+        np.ascontiguousarray(inside.T, np.float32), np.ascontiguousarray(inwards.T, np.float32)
+    )
+    measures = list(measures)
+    for n, k in enumerate(which):
+        cap, radius = caps[k], measures[k][2]
+        assert cap is not None
+        if hit[n] >= 0:
+            radius = float(distance[n] + _AWAY) * frame.scale / 2
+        place = centre[n] + radius * inwards[n]
+        share = abs(float(winding_numbers(place, cap.corners, cap.triangles)[0]))
+        half_angle = float(np.degrees(np.arccos(np.clip(1 - 2 * share, -1, 1))))
+        measures[k] = (centre[n], half_angle, radius)
+    return measures
