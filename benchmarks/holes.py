@@ -39,7 +39,7 @@ from sss_tools.mesh import Mesh
 from sss_tools.repair.ladder import repair_mesh
 from sss_tools.topology import connected_components
 
-PIXELS = 24
+PIXELS = 12
 BATCHES = 8
 ALBEDO, DEPTH = 0.98, 5.0
 """Of the medium; radius of the ball with the solid's ratio of volume to area, in mean free paths."""
@@ -67,24 +67,27 @@ CUTS = [
 def main() -> None:
     """The command."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--passes", type=int, default=24, help="of each batch and view")
-    parser.add_argument("--bunny-passes", type=int, default=96, help="of each batch and view")
-    parser.add_argument("--only", help="one solid")
+    parser.add_argument("--passes", type=int, default=40, help="of each batch and view")
+    parser.add_argument("--bunny-passes", type=int, default=40, help="of each batch and view")
+    parser.add_argument("--only", help='one solid, or "bunny": the rest of holes.json stays as it is')
     parser.add_argument("--meshes", type=Path, default=Path("../shared/meshes"))
     parser.add_argument("-o", "--output", type=Path, default=Path("docs"))
     options = parser.parse_args()
-    rows = []
+    options.output.mkdir(parents=True, exist_ok=True)
+    kept = options.output / "holes.json"
+    figures: dict[str, Any] = {"machine": machine(2), "cases": [], "bunny": []}
+    if options.only and kept.exists():
+        figures |= json.loads(kept.read_text())
+    bunny = options.meshes / "bunny_stanford.obj"
+    if options.only in (None, "bunny") and bunny.exists():
+        figures["bunny"] = bunny_measured(bunny, options.bunny_passes)
     for name, mesh in solids(options.meshes).items():
         if options.only in (None, name):
-            rows += solid_measured(name, mesh, options.passes)
-    bunny = options.meshes / "bunny_stanford.obj"
-    bunnies = bunny_measured(bunny, options.bunny_passes) if options.only in (None, "bunny") and bunny.exists() else []
-    figures = {"machine": machine(2), "cases": rows, "bunny": bunnies}
-    options.output.mkdir(parents=True, exist_ok=True)
-    (options.output / "holes.json").write_text(json.dumps(figures, indent=1) + "\n")
-    table = markdown(figures)
-    (options.output / "holes.md").write_text(table)
-    print(table)
+            others = [row for row in figures["cases"] if row["solid"] != name]
+            figures["cases"] = others + solid_measured(name, mesh, options.passes)
+            kept.write_text(json.dumps(figures, indent=1) + "\n")
+    kept.write_text(json.dumps(figures, indent=1) + "\n")
+    (options.output / "holes.md").write_text(markdown(figures))
 
 
 def solids(folder: Path) -> dict[str, Mesh]:

@@ -9,6 +9,7 @@ outside. One that passes through other components stays, as solids that overlap 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +25,8 @@ from .winding import winding_numbers
 Float64 = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
+BULGE = 1e-2
+"""How far a cap that lies upon another one is bulged out, as a share of its width."""
 _AWAY = 1e-4
 """How far behind a cap the ray starts that measures the room there, as a share of the mesh's longest side."""
 
@@ -96,6 +99,7 @@ def seal(mesh: Mesh, caps: bool = True) -> Sealed:
         plain = _caps(upright, loops, smooth=False)
         made = [simple if crosses else cap for cap, simple, crosses in zip(made, plain, crossing, strict=True)]
         crossing, overlapping = _crossing(body, made)
+    made = _apart(upright, made)
     measures = [_measured(loop, body.topology.points) for loop in loops]
     if loops:
         measures = _seen_from_inside(body, made, measures)
@@ -165,11 +169,62 @@ def _crossing(body: Mesh, caps: list[_Cap | None]) -> tuple[NDArray[np.bool_], b
     own = component[pairs[:, 0]] == component[pairs[:, 1]]
     first, second = owner[pairs[own]].T
     crosses[first[second < 0]] = crosses[second[first < 0]] = True
-    size = [0.0 if cap is None else float(np.ptp(cap.corners, axis=0).max()) for cap in caps]
+    size = [0.0 if cap is None else _width(cap) for cap in caps]
     for one, other in zip(first.tolist(), second.tolist(), strict=True):
         if one >= 0 and other >= 0 and not (crosses[one] or crosses[other]):
             crosses[max(one, other, key=size.__getitem__)] = True
     return crosses, not own.all()
+
+
+def _apart(draft: Draft, caps: list[_Cap | None]) -> list[_Cap | None]:
+    """The caps, the smaller of two that lie upon each other bulged out by a hair.
+
+    A lid and the body under it, cut at one height, are closed by two caps in one plane: rays could not tell which
+    comes first. With the bulge the solids overlap, and that is counted.
+    """
+    component = draft.topology.component_of_face
+    of_point = np.zeros(len(draft.topology.points), np.int64)
+    of_point[draft.topology.faces[draft.topology.live]] = component[draft.topology.live][:, None]
+    caps = list(caps)
+    flat = [(k, cap) for k, cap in enumerate(caps) if cap is not None and len(cap.corners) == len(cap.loop) > 3]
+    for one, other in combinations(flat, 2):
+        if of_point[one[1].loop[0]] != of_point[other[1].loop[0]] and _coincide(one[1], other[1]):
+            place, smaller = min(one, other, key=lambda pair: _width(pair[1]))
+            bulged = _bulged(smaller)
+            if not _crossing(draft.mesh, [bulged])[0][0]:
+                caps[place] = bulged
+    return caps
+
+
+def _width(cap: _Cap) -> float:
+    """The longest side of its box."""
+    return float(np.ptp(cap.corners, axis=0).max())
+
+
+def _coincide(one: _Cap, other: _Cap) -> bool:
+    """Whether two flat caps lie in one plane, as far as rays can tell, with boxes that overlap."""
+    lower = np.maximum(one.corners.min(axis=0), other.corners.min(axis=0))
+    upper = np.minimum(one.corners.max(axis=0), other.corners.max(axis=0))
+    width = max(_width(one), _width(other))
+    if (lower > upper + BULGE * width).any():
+        return False
+    a, b, c = (one.corners[one.triangles[:, side]] for side in range(3))
+    normal = np.cross(b - a, c - a).sum(axis=0)
+    normal /= max(float(np.linalg.norm(normal)), 1e-300)
+    heights = (np.concatenate([one.corners, other.corners]) - one.corners.mean(axis=0)) @ normal
+    return bool(np.abs(heights).max() < BULGE * width / 2)
+
+
+def _bulged(cap: _Cap) -> _Cap:
+    """A fan from the middle of a flat cap's loop, moved outwards by ``BULGE`` of its width."""
+    a, b, c = (cap.corners[cap.triangles[:, side]] for side in range(3))
+    normal = np.cross(b - a, c - a).sum(axis=0)
+    normal /= max(float(np.linalg.norm(normal)), 1e-300)
+    count = len(cap.loop)
+    apex = cap.corners.mean(axis=0) + BULGE * _width(cap) * normal
+    start = np.arange(count)
+    fan = np.stack([start, (start + 1) % count, np.full(count, count)], axis=1)
+    return _Cap(cap.loop, np.concatenate([cap.corners, apex[None]]), fan)
 
 
 def _measured(loop: Indices, points: Float64) -> tuple[Float64, float, float]:
