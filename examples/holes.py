@@ -2,7 +2,8 @@
 
     python examples/holes.py [FOLDER]
 
-The same elephant whole, and with three holes. Handled by "terminate", paths that leave through a hole, or see inside
+The same elephant whole, and with three holes. Handled by "cap", which is what "auto" does, each hole is closed for the
+tracer alone, and next to nothing is left to see. Handled by "terminate", paths that leave through a hole, or see inside
 through one, take the material's colour: the solid stays a solid, and the holes show as patches. Handled by "surface",
 nothing is inside: the diffuse fallback lights the skin alone, and thin parts no longer glow.
 """
@@ -18,6 +19,7 @@ def main() -> None:
     panels = []
     for title, mesh, handling in (
         ("closed", elephant(), "strict"),
+        ("three holes, cap", elephant_with_holes(), "cap"),
         ("three holes, terminate", elephant_with_holes(), "terminate"),
         ("three holes, surface", elephant_with_holes(), "surface"),
     ):

@@ -312,6 +312,9 @@ def test_closedness_decides_what_is_done_at_holes_and_the_command_says_why(
     out = capsys.readouterr().out
     (thing,) = report["objects"]
     assert (thing["state"], thing["hole_handling"]) == (state, handling)
+    capped = handling == "cap"
+    assert (thing["holes"]["loops"], thing["holes"]["capped"]) == (capped, capped)
+    assert (", 0.57 % error expected of it" in out) == capped
     assert f"ball: {state}" in out and f"hole handling {handling}" in out and because in out
 
 
@@ -341,6 +344,7 @@ def test_leaks_and_losses_are_warned_of_beyond_their_budgets(workplace, capsys):
     assert 0 < events["parity_contradictions"] <= events["leaked_rays"]
     error = capsys.readouterr().err
     assert f"warning: ball: {events['leaked_rays']} of {8 * 480} paths (" in error and "taken for closed" in error
+    assert "in the mean at (" in error and "light there is wrong" in error
     lost = reported("--passes", 8, "--hole-handling", "terminate")["rare_events"]["terminated_at_holes"]
     assert f"warning: {lost} of {8 * 480} paths (" in capsys.readouterr().err
     write_mesh(shapes.icosphere(1.0, 3), "ball.ply")
