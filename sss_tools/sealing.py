@@ -2,8 +2,8 @@
 
 Faces are turned so that solids face outwards, every loop of what encloses a volume gets a cap that faces as the
 surface around it does, and the loop is measured as light inside sees it. A cap that would pass through the surface it
-closes, or through another cap of it, is left out: there a count of the surfaces around a place would say less than
-outside. One that passes through other components stays, as solids that overlap count as one.
+closes, or through another cap of it, by more than a fold at its rim, is left out: there a count of the surfaces around
+a place would say less than outside. One that passes through other components stays: solids that overlap count as one.
 """
 
 from __future__ import annotations
@@ -20,11 +20,16 @@ from .rays import RayCaster, UnitFrame
 from .repair.draft import Draft
 from .repair.holes import cap_loop, missing_loops
 from .repair.orientation import orient
-from .winding import winding_numbers
+from .winding import spread_by_area, winding_numbers
 
 Float64 = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
+FOLD = 0.01
+"""Share of a cap's area that may lie in folds through its own component, at jags of the rim: there the count is wrong,
+and paths take the material's colour."""
+_PLACES = 1024
+"""Faces before which is looked for places that are less than outside."""
 BULGE = 1e-2
 """How far a cap that lies upon another one is bulged out, as a share of its width."""
 _AWAY = 1e-4
@@ -57,7 +62,7 @@ class Sealed:
     mesh    the faces of the original in their order, some of them turned; then those of the caps
     faces   how many of them are the original's
     turned  how many were turned
-    overlapping  whether caps pass through other components
+    overlapping  whether caps pass through other components, or fold through their own
     loops   all loops, capped or not
     """
 
@@ -144,10 +149,10 @@ def _joined(body: Mesh, caps: list[_Cap | None]) -> Mesh:
 
 
 def _crossing(body: Mesh, caps: list[_Cap | None]) -> tuple[NDArray[np.bool_], bool]:
-    """(loops,) whether a cap passes through the component whose hole it closes, or is none; of two caps of one
-    component that pass through each other, the larger one. And whether any cap passes through another component.
+    """(loops,) whether a cap passes through the component whose hole it closes by more than a fold, or is none; of two
+    caps of one component that pass through each other, the larger one. And whether any cap meets any surface.
 
-    The latter does no harm: shells that are closed each for themselves add up to a union.
+    Other components do no harm: shells that are closed each for themselves add up to a union.
     """
     crosses = np.array([cap is None for cap in caps], bool)
     present = [cap for cap in caps if cap is not None]
@@ -169,11 +174,38 @@ def _crossing(body: Mesh, caps: list[_Cap | None]) -> tuple[NDArray[np.bool_], b
     own = component[pairs[:, 0]] == component[pairs[:, 1]]
     first, second = owner[pairs[own]].T
     crosses[first[second < 0]] = crosses[second[first < 0]] = True
+    crosses &= _folded_share(whole, owner, pairs[own], len(caps)) > FOLD
     size = [0.0 if cap is None else _width(cap) for cap in caps]
     for one, other in zip(first.tolist(), second.tolist(), strict=True):
-        if one >= 0 and other >= 0 and not (crosses[one] or crosses[other]):
+        if one >= 0 and other >= 0 and one != other and not (crosses[one] or crosses[other]):
             crosses[max(one, other, key=size.__getitem__)] = True
-    return crosses, not own.all()
+    kept = own & ~crosses[np.maximum(owner[pairs], 0)].any(axis=1)
+    remaining = [None if out else cap for cap, out in zip(caps, crosses, strict=True)]
+    if kept.any() and _less_than_outside(_joined(body, remaining)) > FOLD:
+        crosses[np.setdiff1d(owner[pairs[kept]], [-1])] = True
+    return crosses, len(pairs) > 0
+
+
+def _folded_share(whole: Mesh, owner: Indices, pairs: Indices, count: int) -> NDArray[np.float64]:
+    """(count,) share of each cap's area in faces that pass through others; 1 for caps that are not there."""
+    areas = np.where(owner >= 0, whole.face_areas, 0)
+    folded = np.zeros(len(owner), bool)
+    folded[pairs] = True
+    total = np.bincount(np.maximum(owner, 0), areas, count)
+    share = np.bincount(np.maximum(owner, 0), areas * folded, count)
+    return np.divide(share, total, out=np.ones(count), where=total > 0)
+
+
+def _less_than_outside(mesh: Mesh) -> float:
+    """Share of the area before which the winding number is below zero: what a spike through a cap looks like."""
+    from igl import fast_winding_number
+
+    chosen = spread_by_area(mesh.face_areas, _PLACES)
+    chosen = chosen[mesh.face_areas[chosen] > 0]
+    centre = mesh.bounds.mean(axis=0)
+    places = mesh.vertices[mesh.faces[chosen]].mean(axis=1) + _AWAY * mesh.longest_side * mesh.face_normals[chosen]
+    winding = fast_winding_number(mesh.vertices - centre, np.ascontiguousarray(mesh.faces), places - centre)
+    return float((winding < -0.5).mean())
 
 
 def _apart(draft: Draft, caps: list[_Cap | None]) -> list[_Cap | None]:

@@ -314,7 +314,7 @@ def test_closedness_decides_what_is_done_at_holes_and_the_command_says_why(
     assert (thing["state"], thing["hole_handling"]) == (state, handling)
     capped = handling == "cap"
     assert (thing["holes"]["loops"], thing["holes"]["capped"]) == (capped, capped)
-    assert (", 0.57 % error expected of it" in out) == capped
+    assert (f", {100 * (thing['holes']['expected_error'] or 0):.2g} % error expected of it" in out) == capped
     assert f"ball: {state}" in out and f"hole handling {handling}" in out and because in out
 
 
