@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 
 from sss_tools import shapes
+from sss_tools.intersection import self_intersections
 from sss_tools.mesh import Mesh
 from sss_tools.sealing import seal
 from sss_tools.winding import winding_numbers
@@ -95,6 +96,15 @@ def test_a_cap_that_would_cut_through_the_body_is_left_out():
     both = shapes.joined(spiked(), shapes.moved(punctured(20), (3, 0, 0)))
     sealed = seal(both)
     assert sorted(loop.capped for loop in sealed.loops) == [False, True]
+
+
+def test_a_fold_at_the_rim_does_not_cost_the_cap():
+    """A ring cut through: two faces of the caps cross their surroundings."""
+    ring = shapes.punctured(shapes.torus(1.0, 0.4, 64, 32), [[1.4, 0, 0]], 0.8)
+    sealed = seal(ring)
+    crossing = self_intersections(sealed.mesh.topology)
+    assert len(crossing) > 0 and (crossing >= sealed.faces).any(axis=1).all()
+    assert sealed.closed and sealed.overlapping and [loop.capped for loop in sealed.loops] == [True, True]
 
 
 def test_a_cap_may_pass_through_another_solid():
