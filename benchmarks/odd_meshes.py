@@ -22,7 +22,7 @@ from sss_tools import shapes
 from sss_tools.loading import load_mesh
 from sss_tools.mesh import Mesh
 
-SIZE, COLUMNS, CAPTION = 150, 5, 30
+SIZE, COLUMNS, CAPTION = 120, 5, 30
 BLACK = 0.02
 FROM_CORPUS = {
     "Beetle, 33 loops": "beetle_vw.obj",
@@ -35,7 +35,7 @@ FROM_CORPUS = {
 def main() -> None:
     """The command."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--passes", type=int, default=48)
+    parser.add_argument("--passes", type=int, default=16)
     parser.add_argument("--meshes", type=Path, default=Path("../shared/meshes"))
     parser.add_argument("-o", "--output", type=Path, default=Path("docs"))
     options = parser.parse_args()
@@ -119,7 +119,7 @@ def sheet(tiles: list[tuple[str, np.ndarray]]) -> Image.Image:
     """Pictures with captions, ``COLUMNS`` in a row."""
     rows = -(-len(tiles) // COLUMNS)
     image = Image.new("RGB", (COLUMNS * SIZE, rows * (SIZE + CAPTION)), "white")
-    draw, font = ImageDraw.Draw(image), ImageFont.load_default(11)
+    draw, font = ImageDraw.Draw(image), ImageFont.load_default(9)
     for k, (caption, picture) in enumerate(tiles):
         x, y = k % COLUMNS * SIZE, k // COLUMNS * (SIZE + CAPTION)
         pixels = np.round(255 * np.clip(linear_to_srgb(picture), 0, 1)).astype(np.uint8)

@@ -45,6 +45,7 @@ class Loop:
     half_angle  degrees: of the cone with the solid angle that the loop takes of the sphere around the middle of the
                 room behind it; NaN where it spans no area
     radius      half the depth of that room, mesh units
+    width       longest side of the loop's box, mesh units
     capped      whether ``Sealed.mesh`` closes it
     """
 
@@ -52,6 +53,7 @@ class Loop:
     centroid: Float64
     half_angle: float
     radius: float
+    width: float
     capped: bool
 
 
@@ -110,7 +112,8 @@ def seal(mesh: Mesh, caps: bool = True) -> Sealed:
         measures = _seen_from_inside(body, made, measures)
     kept = [cap if caps and not crosses else None for cap, crosses in zip(made, crossing, strict=True)]
     described = tuple(
-        Loop(len(loop), *measure, cap is not None) for loop, measure, cap in zip(loops, measures, kept, strict=True)
+        Loop(len(loop), *measure, float(np.ptp(body.topology.points[loop], axis=0).max()), cap is not None)
+        for loop, measure, cap in zip(loops, measures, kept, strict=True)
     )
     return Sealed(_joined(body, kept), len(body.faces), turned, overlapping, described)
 

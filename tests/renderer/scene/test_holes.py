@@ -74,11 +74,13 @@ def test_expected_errors_are_those_of_the_table_on_a_ball_and_less_on_what_is_la
     """PHYSICS section 7: worse of two lights."""
     for angle, capped, rule in ((5, 0.005, 0.03), (15, 0.006, 0.16), (30, 0.012, 0.39)):
         for made, error in ((True, capped), (False, rule)):
-            loop = Loop(9, np.zeros(3), angle, 1.0, made)
+            loop = Loop(9, np.zeros(3), angle, 1.0, 0.5, made)
             assert expected_error([loop], 4 * np.pi) == pytest.approx(error)
             assert expected_error([loop], 40 * np.pi) == pytest.approx(error / 10)
             assert expected_error([loop, loop], 40 * np.pi) == pytest.approx(error / 5)
-    assert expected_error([Loop(9, np.zeros(3), np.nan, 1.0, False)], 1.0) is None
+    # a loop wider than the room behind it spoils more
+    assert expected_error([Loop(9, np.zeros(3), 30, 1.0, 4.0, True)], 40 * np.pi) == pytest.approx(0.012 * 4 / 10)
+    assert expected_error([Loop(9, np.zeros(3), np.nan, 1.0, 0.5, False)], 1.0) is None
     assert expected_error([], 1.0) == 0
 
 
