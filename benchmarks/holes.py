@@ -300,6 +300,8 @@ def markdown(figures: dict) -> str:
             f"it each for itself. `auto` is worse than the thesis' rule, by more than the noise of both, in "
             f"{len(worse)} of {len(rows)} cases.",
             "",
+            "Solids with cases that miss it: " + (", ".join(sorted({row["solid"] for row in over})) or "none") + ".",
+            "",
             "| solid | cut | handling | caps | half angle | expected | auto: sky | half | terminate: sky | half "
             "| noise |",
             "|---|---|---|---:|---:|---:|---:|---:|---:|---:|---:|",

@@ -35,7 +35,7 @@ FROM_CORPUS = {
 def main() -> None:
     """The command."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--passes", type=int, default=16)
+    parser.add_argument("--passes", type=int, default=6)
     parser.add_argument("--meshes", type=Path, default=Path("../shared/meshes"))
     parser.add_argument("-o", "--output", type=Path, default=Path("docs"))
     options = parser.parse_args()
