@@ -161,21 +161,18 @@ def _checked(path: Path, mesh: Mesh, context: Context, settings: Settings, warn:
 
 
 def _capped(specimen: Specimen) -> Specimen:
-    """The specimen with the surface that closes its holes, where the verdict is to cap them."""
+    """The specimen with the caps that light meets, where the verdict is to cap its holes."""
     closedness = specimen.report.closedness
     if closedness is None or closedness["hole_handling"] != "cap":
         return specimen
-    from sss_tools.repair.draft import Declined, Draft
-    from sss_tools.repair.holes import cap_holes
+    from sss_tools.sealing import seal
 
-    draft = Draft.of(specimen.mesh)
     try:
-        capped = cap_holes(draft)
-    except (Declined, *FAULTS):
+        sealed = seal(specimen.mesh)
+    except FAULTS:
         return specimen  # what cannot be closed is drawn open
-    if capped is None:
-        return specimen
-    return replace(specimen, cap=Mesh(capped.points, capped.faces[len(draft.faces) :]))
+    caps = sealed.mesh.faces[sealed.faces :]
+    return replace(specimen, cap=Mesh(sealed.mesh.vertices, caps)) if len(caps) else specimen
 
 
 def _planned(scene: Scene, specimens: tuple[Specimen, ...]) -> tuple[Specimen, ...]:
