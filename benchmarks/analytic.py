@@ -151,7 +151,7 @@ def cases(tables: dict) -> list[Case]:
 
 def measure(case: Case, row: Row, error: float, seconds: float, seed: int) -> None:
     """Add samples until the relative standard error or the time is reached."""
-    started, before = time.time(), row.seconds
+    started, before = time.monotonic(), row.seconds
     while row.count < LEAST_MEANS or (row.error > error * case.value and row.seconds < seconds):
         if case.what.endswith("normal"):
             row.add(_views(case, row, [(1.0, 0.0)], seed, left=seconds - row.seconds))
@@ -161,7 +161,7 @@ def measure(case: Case, row: Row, error: float, seconds: float, seed: int) -> No
             views = [(float(np.sqrt(c)), float(2 * np.pi * t)) for c, t in zip(squared, draw.random(DIFFUSE_VIEWS),
                                                                             strict=True)]  # fmt: skip
             row.add(_views(case, row, views, seed, left=0.0).mean(keepdims=True))
-        row.seconds = before + time.time() - started
+        row.seconds = before + time.monotonic() - started
 
 
 def _views(case: Case, row: Row, views, seed: int, left: float) -> np.ndarray:
@@ -174,11 +174,11 @@ def _views(case: Case, row: Row, views, seed: int, left: float) -> np.ndarray:
             means.append(float(renderer.film.mean()[..., 0].mean()))
         else:
             sums: list[float] = []
-            begun = time.time()
+            begun = time.monotonic()
 
             def done(_: int, renderer=renderer, sums=sums, begun=begun) -> bool:
                 sums.append(float(renderer.film.mean()[..., 0].mean() * renderer.film.passes))
-                return len(sums) >= 64 or (len(sums) >= 8 and time.time() - begun > left)
+                return len(sums) >= 64 or (len(sums) >= 8 and time.monotonic() - begun > left)
 
             renderer.run(range(64), done)
             means.extend(np.diff([0.0, *sums]))
@@ -194,8 +194,8 @@ def furnace(seconds: float) -> tuple[float, float]:
     body = SceneObject("ball", icosphere(0.5, 5), Translucent(Medium.from_albedo(1.0, 8.0, 0.5, 1.5)))
     camera = Camera(np.array([0.3, 0.4, 2.5]), np.zeros(3), np.array([0.0, 1, 0]), 24.0, (256, 256))
     sky = EnvironmentLight(radiance=np.ones(3))
-    renderer, begun = Renderer(Scene("mm", camera, (sky,), (body,)), Settings(shader="path")), time.time()
-    renderer.run(range(100_000), lambda _: time.time() - begun > seconds)
+    renderer, begun = Renderer(Scene("mm", camera, (sky,), (body,)), Settings(shader="path")), time.monotonic()
+    renderer.run(range(100_000), lambda _: time.monotonic() - begun > seconds)
     return float(np.abs(renderer.film.mean() - 1).max()), renderer.tally.leaked / renderer.tally.samples
 
 

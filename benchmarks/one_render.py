@@ -60,17 +60,17 @@ def ours(options: argparse.Namespace) -> dict:
     from renderer.scene.scene_file import load_scene
 
     renderer = Renderer(load_scene(options.scene), Settings(shader="path", seed=options.seed))
-    begun, cpu = time.time(), time.process_time()
+    begun, cpu = time.monotonic(), time.process_time()
     ended = begun
 
     def done(_: int) -> bool:
         nonlocal ended
-        ended = time.time()
+        ended = time.monotonic()
         return ended - begun > options.seconds and renderer.film.passes >= LEAST
 
     def seconds_left() -> float:
         # as for --time: fewer passes at once towards the end, for what is under way then is lost
-        return begun + options.seconds - time.time() if renderer.film.passes >= LEAST else 1e6
+        return begun + options.seconds - time.monotonic() if renderer.film.passes >= LEAST else 1e6
 
     renderer.run(count(), done, seconds_left)
     film = renderer.film
@@ -97,11 +97,11 @@ def mitsuba(options: argparse.Namespace) -> dict:
     seeds = (1_000_003 * options.seed + k for k in count(1))
 
     def timed(samples: int) -> tuple[np.ndarray, np.ndarray]:
-        begun = np.array([time.time(), time.process_time()])
+        begun = np.array([time.monotonic(), time.process_time()])
         image = np.array(mi.render(scene, spp=samples, seed=next(seeds)), float)
-        return image, np.array([time.time(), time.process_time()]) - begun
+        return image, np.array([time.monotonic(), time.process_time()]) - begun
 
-    loaded = np.array([time.time() - started, time.process_time()])
+    loaded = np.array([time.monotonic() - started, time.process_time()])
     _, cold = timed(1)
     image, once = timed(1)
     # the first call compiles, or reads what was compiled before
@@ -110,8 +110,8 @@ def mitsuba(options: argparse.Namespace) -> dict:
     least, most = (max(lanes // pixels, 1) for lanes in LANES)
     _, several = timed(least)
     samples = int(np.clip(least * options.seconds / CALLS / several[0], least, most))
-    begun, cpu, images = time.time(), time.process_time(), []
-    while time.time() - begun < options.seconds or len(images) < 4:
+    begun, cpu, images = time.monotonic(), time.process_time(), []
+    while time.monotonic() - begun < options.seconds or len(images) < 4:
         images.append(timed(samples)[0])
     return {
         "mean": np.mean(images, axis=0),
@@ -120,7 +120,7 @@ def mitsuba(options: argparse.Namespace) -> dict:
         "freedom": len(images) - 1,
         "setup": setup,
         "setup_cpu": setup_cpu,
-        "render": time.time() - begun,
+        "render": time.monotonic() - begun,
         "cpu": time.process_time() - cpu,
     }
 

@@ -73,7 +73,7 @@ def main() -> int:
 
 
 def _render(name: str, options: argparse.Namespace) -> tuple[Renderer, float]:
-    started = time.time()
+    started = time.monotonic()
     scene = load_scene(options.shared / "reference" / "scenes" / f"{name}.toml")
     renderer = Renderer(scene, Settings(shader="path", seed=options.seed))
     output = options.work / f"{name}.npz"

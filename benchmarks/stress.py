@@ -353,16 +353,16 @@ CASES: dict[str, Callable[[], Case]] = {
 def measure(name: str) -> dict:
     """Render a case in this process; its row."""
     case = CASES[name]()
-    started = time.time()
+    started = time.monotonic()
     try:
         film, row = _render(case.scene, case, 0, started)
         if case.judge == "twin":
-            twin, other = _render(case.twin or case.scene, case, 1, time.time(), plain=case.twin is None)
+            twin, other = _render(case.twin or case.scene, case, 1, time.monotonic(), plain=case.twin is None)
             for count in ("leaked", "paths", "non_finite"):
                 row[count] += other[count]
             row["setup"] = max(row["setup"], other["setup"])
     except InputError as error:
-        return {"refused": str(error), "seconds": time.time() - started, "memory": peak_memory()}
+        return {"refused": str(error), "seconds": time.monotonic() - started, "memory": peak_memory()}
     row["memory"] = peak_memory()
     mean, noise = _mean(film)
     row["lit"] = float(film.mean().max())
@@ -387,20 +387,20 @@ def _render(of: Scene, case: Case, seed: int, started: float, plain: bool = Fals
         renderer.acceleration = Acceleration.none(renderer.traced.media.count)
     elif pixels:
         renderer.acceleration = Acceleration.chosen(renderer.traced, pixels)
-    begun = time.time()
+    begun = time.monotonic()
     seconds = case.seconds / (2 if case.judge == "twin" else 1)
     first = []
 
     def done(_: int) -> bool:
-        first.append(time.time() - begun)
-        return time.time() - begun > seconds and (renderer.film.passes >= 8 or seconds == 0)
+        first.append(time.monotonic() - begun)
+        return time.monotonic() - begun > seconds and (renderer.film.passes >= 8 or seconds == 0)
 
-    renderer.run(range(100_000), done, lambda: begun + seconds - time.time())
+    renderer.run(range(100_000), done, lambda: begun + seconds - time.monotonic())
     tally = renderer.tally
     return renderer.film, {
         "setup": begun - started,
         "first": first[0],
-        "seconds": time.time() - started,
+        "seconds": time.monotonic() - started,
         "passes": renderer.film.passes,
         "leaked": tally.leaked,
         "paths": tally.samples,

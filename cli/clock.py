@@ -6,11 +6,11 @@ import os
 import time
 from pathlib import Path
 
-_IMPORTED = time.time()
+_IMPORTED = time.monotonic()
 
 
 def process_start() -> float:
-    """Seconds since the epoch, as ``time.time``: the start of the process on Linux, elsewhere of this module.
+    """On the clock of ``time.monotonic``: the start of the process on Linux, elsewhere of this module.
 
     Linux tells in field 22 of /proc/self/stat (proc(5)), in clock ticks since boot.
     """
@@ -20,4 +20,4 @@ def process_start() -> float:
         age = uptime - int(fields[19]) / os.sysconf("SC_CLK_TCK")
     except (OSError, ValueError, IndexError, AttributeError):
         return _IMPORTED
-    return time.time() - max(age, 0.0)
+    return time.monotonic() - max(age, 0.0)

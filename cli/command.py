@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any, NoReturn
 
-from sss_tools.errors import InputError
+from sss_tools.errors import InputError, one_line
 
 EXIT_UNUSABLE = 2
 EXIT_INTERRUPTED = 130
@@ -59,8 +59,7 @@ def version() -> str:
 
 def complain(program: str, message: str, kind: str = "error") -> None:
     """``PROGRAM: error: message`` on stderr, on one line whatever the message contains."""
-    line = " ".join(f"{program}: {kind}: {message}".split())
-    sys.stderr.write(line.encode(errors="backslashreplace").decode() + "\n")
+    sys.stderr.write(one_line(f"{program}: {kind}: {message}") + "\n")
 
 
 def unavailable(option: str, remedy: str = "leave it out") -> InputError:
@@ -73,7 +72,7 @@ def run(program: str, body: Callable[[Sequence[str] | None], int], argv: Sequenc
 
     program  the command's name, in front of its errors
     body     takes the arguments, returns the status
-    InputError becomes one line and status 2, Ctrl-C status 130; library warnings become lines on stderr.
+    InputError and MemoryError become one line and status 2, Ctrl-C status 130; library warnings become lines on stderr.
     """
     for stream in (sys.stdout, sys.stderr):
         # names of files need not be text in the terminal's encoding
@@ -88,6 +87,9 @@ def run(program: str, body: Callable[[Sequence[str] | None], int], argv: Sequenc
             return status
         except InputError as error:
             complain(program, error.line())
+            return EXIT_UNUSABLE
+        except MemoryError:
+            complain(program, "out of memory; give it less to do, or more with --max-memory")
             return EXIT_UNUSABLE
         except KeyboardInterrupt:
             complain(program, "interrupted")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from pathlib import Path
 
 from renderer.scene.description import Translucent
@@ -10,6 +9,7 @@ from renderer.scene.materials import read_material
 from sss_tools.errors import InputError
 from sss_tools.keys import Place, did_you_mean
 from sss_tools.medium import PRESETS, UNITS, Medium
+from sss_tools.toml_file import read_toml
 
 
 def medium_of(name: str, unit: str = "mm", source: str = "--material") -> Medium:
@@ -29,11 +29,9 @@ def medium_of(name: str, unit: str = "mm", source: str = "--material") -> Medium
             raise InputError(f"{source} {name}", "no such file", "check the path, or name a preset")
         raise InputError(f"{source} {name}", "no such preset, and no such file", did_you_mean(name, PRESETS))
     try:
-        table = tomllib.loads(path.read_text(encoding="utf-8"))
+        table = read_toml(path)
     except OSError as error:
         raise InputError(path, f"cannot be read ({error.strerror})", "give a readable TOML file") from None
-    except (ValueError, RecursionError) as error:
-        raise InputError(path, f"is no valid TOML: {error}", "correct the syntax") from None
     own_unit = table.pop("unit", "mm")
     if own_unit not in UNITS:
         raise InputError(path, f'"unit" is {own_unit!r}', f"use one of {', '.join(UNITS)}")

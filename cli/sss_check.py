@@ -103,7 +103,8 @@ def _parser() -> ArgumentParser:
     add("--jobs", type=_positive_int, metavar="N", help="meshes checked at a time (default: one a processor)")
     add("--scheduler", metavar="ADDRESS", help="check on the Dask cluster with this scheduler")
     add("--timeout", type=_positive, metavar="S", help="seconds a mesh may take (default 300)")
-    add("--max-memory", type=_size, metavar="SIZE", help="memory a mesh may take: 500M, 2G (default: no limit)")
+    add("--max-memory", type=_size, metavar="SIZE", help="memory a mesh may take: 500M, 2G (default: half of "
+        "the machine's)")  # fmt: skip
     add("--no-cache", action="store_true", help="check again what was checked before")
     add("--isolated", action="store_true", help="read no configuration file")
     add("--exit-zero", action="store_true", help="findings do not change the exit status")

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from sss_tools.errors import InputError
+from sss_tools.memory import limited_memory, share_of_memory
 
 from .clock import process_start
 from .command import ArgumentParser, complain, progress, run, unavailable, version
@@ -23,6 +24,8 @@ if TYPE_CHECKING:
     from renderer.scene.description import Scene
 
 PROGRAM = "sss-render"
+_SHARE = 0.9
+"""Of the machine's memory to use at most: beyond that systems end processes without a word."""
 
 # before NumPy is imported: all systems of equations here are small, and on a busy machine OpenBLAS's own threads wait
 # for each other ten times as long as they work
@@ -59,9 +62,12 @@ def _render(argv: Sequence[str] | None) -> int:
     parser = _parser()
     options = parser.parse_args(arguments)
     _refuse(options)
-    if options.export is not None:
-        return _export(options, parser)
+    with limited_memory(options.max_memory or share_of_memory(_SHARE)):
+        return _picture(options, started) if options.export is None else _export(options, parser)
 
+
+def _picture(options: Any, started: float) -> int:
+    """Render and write."""
     from renderer.job import execute, guide_arrays, rare_event_warnings, report
     from renderer.output.image import check_writable
     from renderer.render import Renderer, Settings, Stages
@@ -94,7 +100,7 @@ def _render(argv: Sequence[str] | None) -> int:
             shown = share
 
         picture = execute(renderer, options.output, budget, options.resume, aovs, show, options.preview)
-    total = time.time() - started
+    total = time.monotonic() - started
     for text in rare_event_warnings(renderer):
         complain(PROGRAM, text, "warning")
     if options.report is not None:
@@ -131,6 +137,8 @@ def _parser() -> ArgumentParser:
     parser.add_argument("--seed", type=_whole, default=0, metavar="K", help="of the random numbers (default: 0)")
     parser.add_argument("--threads", type=_positive_int, metavar="N", help="default: one a core")
     parser.add_argument("--scheduler", metavar="ADDRESS", help="of a cluster")
+    parser.add_argument("--max-memory", type=_memory, metavar="SIZE",
+                        help="bytes to use at most: 500M, 2G (default: nine tenths of the machine's)")  # fmt: skip
     parser.add_argument("--size", type=_size, metavar="WxH", help="of the picture (default: the scene's, or 500x500)")
     parser.add_argument("--material", metavar="NAME", help="preset for a bare mesh (default: marble's albedo at a "
                         "mean free path of 2 %% of the size)")  # fmt: skip
@@ -158,7 +166,19 @@ def _refuse(options: Any) -> None:
         raise InputError("--material", "is for bare meshes", "set the material in the scene file")
 
 
-_FOR_EXPORT = {"scene", "output", "export", "passes", "seed", "size", "material", "unit", "quiet", "verbose"}
+_FOR_EXPORT = {
+    "max_memory",
+    "scene",
+    "output",
+    "export",
+    "passes",
+    "seed",
+    "size",
+    "material",
+    "unit",
+    "quiet",
+    "verbose",
+}
 
 
 def _export(options: Any, parser: ArgumentParser) -> int:
@@ -262,8 +282,9 @@ def _merge(arguments: list[str]) -> int:
     from renderer.output import image
 
     image.check_writable(options.output)
-    picture = merged(options.parts)
-    image.write(options.output, picture)
+    with limited_memory(share_of_memory(_SHARE)):
+        picture = merged(options.parts)
+        image.write(options.output, picture)
     if not options.quiet:
         print(f"{options.output}: {picture.film.passes} passes")
     return 0
@@ -307,6 +328,12 @@ def _size(text: str) -> tuple[int, int]:
     return width, height
 
 
+def _memory(text: str) -> int:
+    from sss_tools.configuration import size_of
+
+    return size_of(text)
+
+
 def _pass_range(text: str) -> tuple[int, int]:
     first, last = (int(part) for part in text.split(":"))
     if not 0 <= first < last:
@@ -320,6 +347,7 @@ for _type, _name in (
     (_whole, "whole number"),
     (_share, "number from 0 to 1"),
     (_size, "size WIDTHxHEIGHT"),
+    (_memory, "size like 500M or 2G"),
     (_pass_range, "range A:B"),
 ):
     _type.__name__ = _name  # what argparse calls the kind of value in its message

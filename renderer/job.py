@@ -45,7 +45,7 @@ class Budget:
     seconds       wall seconds since ``started`` until the file is written
     target_error  mean relative standard error over object pixels
     adaptive      noisy pixels take part in more passes than others, see ``adaptive``
-    started       when the command began, by ``time.time``
+    started       when the command began, by ``time.monotonic``: clocks may be set while a render runs
     """
 
     first: int = 0
@@ -82,7 +82,7 @@ def execute(
     """
     image.check_writable(output)
     checkpoint = checkpoint_path(output)
-    kept = [_Refreshed(checkpoint, time.time() + REFRESH_EVERY)]
+    kept = [_Refreshed(checkpoint, time.monotonic() + REFRESH_EVERY)]
     if preview is not None:
         image.check_writable(preview)
         if preview.resolve() in (output.resolve(), checkpoint.resolve()):
@@ -90,7 +90,7 @@ def execute(
         kept.append(_Refreshed(preview))
     if resume:
         renderer.film = _resumed(renderer.film, output, checkpoint)
-    pass_at = time.time()
+    pass_at = time.monotonic()
     pass_seconds, error = 0.0, float("nan")
 
     def finished() -> bool:
@@ -102,11 +102,11 @@ def execute(
     def seconds_left() -> float:
         assert budget.seconds is not None
         writing = max(0.1, *(file.seconds for file in kept)) * len(kept)
-        return budget.started + budget.seconds - time.time() - writing
+        return budget.started + budget.seconds - time.monotonic() - writing
 
     def after_pass(index: int) -> bool:
         nonlocal pass_at, pass_seconds, error
-        now = time.time()
+        now = time.monotonic()
         pass_seconds, pass_at = now - pass_at, now
         if budget.target_error is not None:
             error = renderer.film.mean_relative_stderr()
@@ -118,7 +118,7 @@ def execute(
 
     def write() -> Picture:
         with renderer.stages.stage("write"):
-            picture = renderer.picture(time.time() - budget.started, aovs)
+            picture = renderer.picture(time.monotonic() - budget.started, aovs)
             image.write(output, picture)
         if preview is not None:
             _Refreshed(preview).refresh(renderer, budget)
@@ -133,7 +133,7 @@ def execute(
         if renderer.film.passes:
             write()
             if output.suffix != ".npz":
-                image.write(checkpoint, renderer.picture(time.time() - budget.started))
+                image.write(checkpoint, renderer.picture(time.monotonic() - budget.started))
         raise
     picture = write()
     checkpoint.unlink(missing_ok=True)
@@ -179,7 +179,7 @@ class _Refreshed:
 
     def refresh(self, renderer: Renderer, budget: Budget) -> None:
         """Write the film so far, if it is time."""
-        start = time.time()
+        start = time.monotonic()
         if start < self.due:
             return
         try:
@@ -189,7 +189,7 @@ class _Refreshed:
             warnings.warn(f"{error.line()}; it is kept up to date no longer", stacklevel=2)
             self.due = math.inf
             return
-        end = time.time()
+        end = time.monotonic()
         self.seconds = end - start
         self.due = end + max(REFRESH_EVERY, self.seconds / REFRESH_SHARE)
 

@@ -18,7 +18,6 @@ nearest to the working directory. Files are not merged, and in one folder ``sss.
 from __future__ import annotations
 
 import re
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
@@ -28,6 +27,7 @@ from typing import Any
 from .errors import InputError
 from .keys import Key, Kind, Place, one_of, read_keys, to_number, to_text
 from .medium import UNITS
+from .toml_file import read_toml
 from .validation.outcome import Severity
 from .validation.rule import all_rules
 
@@ -111,12 +111,9 @@ def _of_folder(folder: Path) -> Configuration | None:
 def _table(path: Path) -> Any:
     """What a file says about this tool; None where a pyproject.toml has nothing to say."""
     try:
-        with path.open("rb") as file:
-            data = tomllib.load(file)
+        data = read_toml(path)
     except OSError as error:
         raise InputError(path, f"cannot be read ({error.strerror})", "check its permissions") from None
-    except (ValueError, RecursionError) as error:
-        raise InputError(path, f"is no valid TOML: {error}", "correct the syntax") from None
     if path.name == "sss.toml":
         return data
     tools = data.get("tool")

@@ -16,16 +16,22 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from . import completeness
+from . import completeness, gltf_structure, unfolding, xml_structure
 from .errors import InputError
 from .mesh import Body, Mesh
 from .ply import read_ply
+from .reading import read_file
 
 if TYPE_CHECKING:
     import trimesh
 
+    from .beside import FilesBeside
+
 SUFFIXES = (".ply", ".obj", ".stl", ".off", ".glb", ".gltf", ".3mf", ".dae")
 """The kinds of files ``load_mesh`` reads, in lower case."""
+
+_NAMED_KINDS: dict[str, tuple[str, ...] | None] = {".obj": (".mtl",), ".gltf": None, ".glb": None}
+"""Of the files that a mesh file names, those that are read for its geometry and the names of its materials."""
 
 _SILENT = logging.NullHandler()
 _REMEDY = "write it again from its source"
@@ -43,8 +49,10 @@ def load_mesh(path: str | Path) -> Mesh:
     A file without faces is a mesh without faces. NaN and infinite coordinates are passed on as they are; a
     caller that computes with positions checks them first.
 
-    Reads this file and, for OBJ and glTF, the files beside it that it names; nothing from the network.
-    Raises InputError for a file that is missing, of no known kind, corrupt, or holds less than it promises.
+    Reads this file and, for OBJ and glTF, the files beside it that it names (material libraries and buffers, no
+    images); nothing from elsewhere, nothing from the network. See ``unfolding`` for what small files may grow to.
+    Raises InputError for a file that is missing, of no known kind, corrupt, holds less than it promises, unfolds to too
+    much, or changes while it is read.
     """
     path = Path(path)
     data = _read(path)
@@ -53,8 +61,8 @@ def load_mesh(path: str | Path) -> Mesh:
         # numbers that make no sense are refused or reported, not warned of on the terminal
         with np.errstate(all="ignore"):
             return _parse(path, suffix, data)
-    except MemoryError:
-        raise  # says nothing about the file
+    except (MemoryError, InputError):
+        raise  # says nothing about the file, or all there is to say
     # The parsers are not written against hostile files: a stray byte surfaces as any exception of numpy,
     # zipfile, json, lxml or collada, and each of them means the same to the user.
     except Exception as error:
@@ -66,18 +74,41 @@ def _parse(path: Path, suffix: str, data: bytes) -> Mesh:
     if suffix == ".ply":
         vertices, faces, attributes = read_ply(data)
         return Mesh(vertices, faces, (Body(path.stem, 0, len(faces)),), attributes, path)
-    data, promised = completeness.check(suffix, data)
-    mesh = _mesh_of_scene(_load_scene(path, suffix, data), path)
+    if suffix in (".gltf", ".glb"):
+        data = gltf_structure.without_images(suffix, data)
+    scene, promised = load_checked(path, data, _NAMED_KINDS.get(suffix, ()))
+    _check_size(scene, len(data))
+    mesh = _mesh_of_scene(scene, path)
     if promised is not None and len(mesh.faces) != promised:
         raise ValueError(f"corrupt: it has {promised} triangles, of which {len(mesh.faces)} make sense")
     return mesh
 
 
+def load_checked(path: Path, data: bytes, named: tuple[str, ...] | None = None) -> tuple[trimesh.Scene, int | None]:
+    """A mesh file of any kind but PLY as trimesh sees it, and how many triangles it promises where it says so.
+
+    data   its bytes
+    named  kinds of files beside it that it may name; None: all
+
+    Raises whatever its parser does, ValueError for what is incomplete or unfolds to too much.
+    """
+    from .beside import FilesBeside
+
+    suffix, beside = path.suffix.lower(), FilesBeside(path, named)
+    data, promised = completeness.check(suffix, data)
+    match suffix:
+        case ".gltf" | ".glb":
+            gltf_structure.check(suffix, data, beside.size)
+        case ".3mf":
+            xml_structure.check_archive(data)
+        case ".dae":
+            xml_structure.check_collada(data)
+    return _load_scene(suffix, data, beside), promised
+
+
 def _reason(error: Exception) -> str:
     """What a parser's exception means, in a few words."""
     message = str(error).strip().split("\n")[0][:200]
-    if "escapes resolver root" in message:
-        return "it names a file outside its folder"
     if isinstance(error, FileNotFoundError):
         return f"it names '{message}', which is not in its folder"
     if isinstance(error, ValueError) and message:
@@ -95,7 +126,7 @@ def _read(path: Path) -> bytes:
             raise InputError(path, "no such file", "check the path")
         raise InputError(path, f"'{path.suffix}' is no known kind of mesh file", f"use one of {kinds}")
     try:
-        data = path.read_bytes()
+        data = read_file(path)
     except FileNotFoundError:
         raise InputError(path, "no such file", "check the path") from None
     except OSError as error:
@@ -105,16 +136,26 @@ def _read(path: Path) -> bytes:
     return data
 
 
-def _load_scene(path: Path, suffix: str, data: bytes) -> trimesh.Scene:
-    """The file as trimesh sees it; files it names are looked for beside it only."""
+def _load_scene(suffix: str, data: bytes, resolver: FilesBeside) -> trimesh.Scene:
+    """The file as trimesh sees it."""
     import trimesh
 
     # what it has to say about a file, tracebacks included, goes to whoever listens and not to the terminal
     logging.getLogger("trimesh").addHandler(_SILENT)
-    resolver = trimesh.resolvers.FilePathResolver(str(path))
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         return trimesh.load_scene(io.BytesIO(data), file_type=suffix[1:], resolver=resolver, process=False)
+
+
+def _check_size(scene: trimesh.Scene, size: int) -> None:
+    """Refuse bodies that are placed so often that they are far more than the file."""
+    bytes_of = {
+        name: 24 * (len(getattr(body, "vertices", ())) + len(getattr(body, "faces", ())))
+        for name, body in scene.geometry.items()
+    }
+    if len(scene.graph.nodes_geometry) > unfolding.MOST_NODES:
+        raise ValueError(f"its scene has more than {unfolding.MOST_NODES} bodies")
+    unfolding.check_geometry(sum(bytes_of[scene.graph[node][1]] for node in scene.graph.nodes_geometry), size)
 
 
 def _mesh_of_scene(scene: trimesh.Scene, path: Path) -> Mesh:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import hashlib
 import json
 import warnings
@@ -13,12 +14,17 @@ from typing import Any
 import numpy as np
 
 from .closedness import Closedness
+from .errors import InputError
 from .files import write_atomically
 from .medium import Medium
 from .mesh import Mesh
+from .reading import read_file
 from .validation.outcome import RULES_VERSION, MeshReport
 
 SCHEMA = "sss-record/1"
+MOST_BYTES = 64 * 2**20
+"""A record with the most that all rules list has some 2 MB."""
+
 OTHER_GEOMETRY = "belongs to other geometry: the mesh has changed since"
 
 
@@ -77,7 +83,8 @@ def write_record(
     waivers: Mapping[str, str] | None = None,
     repairs: Sequence[Mapping[str, Any]] = (),
 ) -> Path:
-    """Write what ``report`` says about ``mesh`` beside it. Raises OSError where that is not possible.
+    """Write what ``report`` says about ``mesh`` beside it. Raises OSError where that is not possible, and where a link
+    has the record's name: who made it chose what would be overwritten.
 
     material, medium, unit  what it was judged against: its name, its coefficients per mesh unit, what that unit is
     waivers                 code -> reason
@@ -99,6 +106,8 @@ def write_record(
         "repairs": [dict(repair) for repair in repairs],
     }
     path = record_path(mesh_path)
+    if path.is_symlink():
+        raise OSError(errno.ELOOP, "a link has its name")
     write_atomically(path, (json.dumps(record, indent=1) + "\n").encode())
     return path
 
@@ -176,9 +185,11 @@ def read_waivers(mesh_path: str | Path, digest: str) -> tuple[dict[str, str], li
 def _parse(path: Path) -> dict[str, Any] | None:
     """What a record says; None where there is none. Raises ValueError for what is no record."""
     try:
-        data = json.loads(path.read_bytes())
+        data = json.loads(read_file(path, MOST_BYTES))
     except FileNotFoundError:
         return None
+    except InputError as error:
+        raise ValueError(f"cannot be read: it {error.problem}") from None
     except (OSError, ValueError, RecursionError) as error:
         raise ValueError(f"cannot be read ({error})") from None
     if not isinstance(data, dict) or data.get("schema") != SCHEMA:

@@ -9,20 +9,23 @@ import contextlib
 import multiprocessing
 import os
 import signal
-import sys
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 from multiprocessing.connection import Connection, wait
 from multiprocessing.context import SpawnProcess
 from typing import Any
 
+from .memory import limited_memory, share_of_memory, shown_size
 from .validation.outcome import MeshReport
 from .validation.settings import Settings
 
 TIMEOUT = 300.0
 """Seconds one mesh may take unless the user says otherwise."""
+
+SHARE = 0.5
+"""Of the memory of the machine that a mesh may take unless the user says otherwise."""
 
 START = 120.0
 """Seconds a worker may take to start: seconds of imports, on a machine under load."""
@@ -35,13 +38,19 @@ class Task:
     """One mesh to check.
 
     timeout     seconds it may take, after which its worker is stopped
-    max_memory  bytes of data its worker may hold while it does; None for no limit. Not kept on Windows
+    max_memory  bytes of data its worker may hold while it does; None: half of what its machine or container has. Not
+                kept on Windows
     """
 
     path: str
     settings: Settings
     timeout: float = TIMEOUT
     max_memory: int | None = None
+
+    @property
+    def memory(self) -> int | None:
+        """``max_memory`` in numbers, on the machine that asks; None where that does not tell its memory."""
+        return self.max_memory or share_of_memory(SHARE)
 
 
 class Worker:
@@ -134,7 +143,8 @@ class Worker:
             self._process.join(timeout=5)
             code = self._process.exitcode
             self.stop()
-        limit = "" if self._task.max_memory is None else f" (its memory was limited to {_size(self._task.max_memory)})"
+        memory = self._task.memory
+        limit = "" if memory is None else f" (its memory was limited to {shown_size(memory)})"
         if code is not None and code < 0:
             return f"the check was ended by {_signal_name(-code)}{limit}"
         return f"the check ended with status {code}{limit}"
@@ -145,10 +155,6 @@ def _signal_name(number: int) -> str:
         return f"{signal.Signals(number).name} (signal {number})"
     except ValueError:
         return f"signal {number}"
-
-
-def _size(count: int) -> str:
-    return f"{count / 2**30:.3g} GiB" if count >= 2**30 else f"{count / 2**20:.3g} MiB"
 
 
 def _serve(pipe: Any, check: Check | None, folder: str | None) -> None:
@@ -188,30 +194,11 @@ def _checked(task: Task, check: Check) -> MeshReport:
     from .validation.run import report_not_checked
 
     try:
-        with _limited_memory(task.max_memory):
+        with limited_memory(task.memory):
             return check(task.path, task.settings)
     except MemoryError:
-        limit = "" if task.max_memory is None else f": it needs more than {_size(task.max_memory)}"
+        limit = "" if task.memory is None else f": it needs more than {shown_size(task.memory)}"
         return report_not_checked(task.path, f"out of memory{limit}", task.settings)
     except Exception as error:  # the last line of defence: one line in the report, not a traceback
         reason = f"the check failed ({type(error).__name__}: {error})"
         return report_not_checked(task.path, reason, task.settings, raised=True)
-
-
-@contextlib.contextmanager
-def _limited_memory(limit: int | None) -> Iterator[None]:
-    """Allocations beyond ``limit`` bytes of data fail as long as this lasts, where the platform can do that."""
-    if limit is None or sys.platform == "win32":
-        yield
-        return
-    import resource
-
-    # RLIMIT_DATA counts what a process may write to (Linux 4.7 and later); the address space, with its mapped
-    # libraries and reserved stacks, is several times that
-    kind = resource.RLIMIT_DATA
-    soft, hard = resource.getrlimit(kind)
-    try:
-        resource.setrlimit(kind, (limit if hard == resource.RLIM_INFINITY else min(limit, hard), hard))
-        yield
-    finally:
-        resource.setrlimit(kind, (soft, hard))

@@ -13,6 +13,12 @@ from .passes import Ranges
 
 Float64 = NDArray[np.float64]
 
+MOST_PIXELS = 2**26
+"""A film keeps some 60 bytes a pixel: 4 GB at this size, 8192 x 8192."""
+
+_LONGEST_TEXT = 1024
+"""Bytes."""
+
 _ARRAYS = ("sum", "sum_of_squares", "hits", "left_out", "biased")
 _UNEVEN_ARRAYS = ("skipped", "resting")
 """In files only of films whose pixels do not all take part in all passes."""
@@ -210,6 +216,10 @@ class Film:
     @classmethod
     def from_arrays(cls, arrays: Mapping[str, NDArray]) -> Film:
         """The film that ``arrays`` were made of. Raises KeyError or ValueError for arrays of no film."""
+        if arrays["film_hits"].ndim != 2 or not 0 < arrays["film_hits"].size <= MOST_PIXELS:
+            raise ValueError(f"hits has shape {arrays['film_hits'].shape}")
+        if any(arrays[name].ndim or arrays[name].nbytes > _LONGEST_TEXT for name in ("film_scene_hash", "film_seed")):
+            raise ValueError("scene hash and seed are no short texts")
         even = np.zeros(arrays["film_hits"].shape)
         uneven = {"skipped": even.astype(np.int32), "resting": even.astype(bool)}
         film = cls(
@@ -219,14 +229,26 @@ class Film:
             **{name: arrays[f"film_{name}"] for name in _ARRAYS},
             **{name: arrays.get(f"film_{name}", zeros) for name, zeros in uneven.items()},
         )
-        if film.hits.ndim != 2:
-            raise ValueError(f"hits has shape {film.hits.shape}")
         blank = cls.blank(film.resolution)
         for name in (*_ARRAYS, *_UNEVEN_ARRAYS):
             array, like = getattr(film, name), getattr(blank, name)
             if array.shape != like.shape or array.dtype != like.dtype:
                 raise ValueError(f"{name} is {array.dtype} of shape {array.shape}")
+        film._check_sums()
         return film
+
+    def _check_sums(self) -> None:
+        """Raise ValueError for counts and sums that no passes add up to."""
+        if self.passes > np.iinfo(np.int32).max:
+            raise ValueError(f"{self.passes} passes are more than can be counted")
+        for name in ("hits", "left_out", "skipped"):
+            counts = getattr(self, name)
+            if counts.min() < 0 or counts.max() > self.passes:
+                raise ValueError(f"{name} has counts that {self.passes} passes cannot have")
+        if (self.left_out + self.skipped > self.passes).any():
+            raise ValueError("more samples are left out than there are")
+        if not np.isfinite(self.sum).all() or not np.isfinite(self.sum_of_squares).all():
+            raise ValueError("its sums are not finite")
 
 
 def _ratio(numerator: NDArray, denominator: NDArray) -> Float64:

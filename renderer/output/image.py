@@ -8,11 +8,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from tempfile import NamedTemporaryFile, TemporaryDirectory
-from zipfile import BadZipFile
 
 import numpy as np
 from numpy.typing import NDArray
 
+from sss_tools.arrays import ARRAY_ERRORS, read_npz
 from sss_tools.errors import InputError
 from sss_tools.files import write_atomically
 
@@ -88,16 +88,21 @@ def read(path: Path) -> Picture:
     Raises InputError for a file that is missing, corrupt, or holds no film.
     """
     try:
-        with np.load(path, allow_pickle=False) as file:
-            arrays = dict(file)
+        arrays = read_npz(path)
         film = Film.from_arrays(arrays)
         picture = Picture(film, float(arrays["seconds"]), arrays["shader_id"], arrays["object_id"])
     except FileNotFoundError:
         raise InputError(path, "there is no such file", "check the path") from None
-    except (OSError, ValueError, KeyError, EOFError, AttributeError, TypeError, BadZipFile) as error:
+    except ARRAY_ERRORS as error:
         raise InputError(path, f"holds no film ({error})", "give an npz file of sss-render") from None
+    for name, array in (("shader_id", picture.shader_id), ("object_id", picture.object_id)):
+        if array.shape != film.hits.shape or array.dtype != np.int32:
+            raise InputError(path, f"its {name} is {array.dtype} of shape {array.shape}", "give a file of sss-render")
     known = film.arrays().keys() | _npz_arrays(picture).keys()
     picture.aovs = {name: array for name, array in arrays.items() if name not in known}
+    for name, array in picture.aovs.items():
+        if array.shape not in (film.hits.shape, film.sum.shape) or array.dtype.kind not in "fiub":
+            raise InputError(path, f"its {name} is {array.dtype} of shape {array.shape}", "give a file of sss-render")
     return picture
 
 

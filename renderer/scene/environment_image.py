@@ -2,16 +2,26 @@
 
 from __future__ import annotations
 
+import io
 import os
+import struct
+import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager, redirect_stdout
 from pathlib import Path
-from zipfile import BadZipFile
 
 import numpy as np
 from numpy.typing import NDArray
 
+from sss_tools import unfolding
+from sss_tools.arrays import ARRAY_ERRORS, read_npy, read_npz
 from sss_tools.errors import InputError
+from sss_tools.reading import read_file
+
+from . import exr_header
+
+_MOST_SCANS = 256
+"""Of a JPEG; each takes time for all pixels. Encoders write ten."""
 
 
 def read_environment_image(path: Path) -> NDArray[np.float32]:
@@ -31,7 +41,7 @@ def read_environment_image(path: Path) -> NDArray[np.float32]:
     try:
         image = np.asarray(reader(path))
     # the libraries' errors for broken files, named: SyntaxError is Pillow's for PNG chunks
-    except (OSError, ValueError, KeyError, EOFError, RuntimeError, SyntaxError, BadZipFile) as error:
+    except (*ARRAY_ERRORS, SyntaxError, struct.error) as error:
         raise InputError(path, f"the image cannot be read ({error})", "write it again") from None
     if image.ndim == 2:
         image = np.repeat(image[..., None], 3, axis=2)
@@ -56,6 +66,8 @@ def is_file(path: Path) -> bool:
 def _read_exr(path: Path) -> NDArray:
     import OpenEXR
 
+    data = read_file(path)
+    unfolding.check_image(exr_header.unfolded_bytes(data), len(data))
     with _silence(), OpenEXR.File(str(path), separate_channels=True) as file:
         channels = {name: channel.pixels for name, channel in file.channels().items()}
     names = ("R", "G", "B") if "R" in channels else ("Y", "Y", "Y")
@@ -77,23 +89,29 @@ def _silence() -> Iterator[None]:
             os.close(kept)
 
 
-def _read_npy(path: Path) -> NDArray:
-    return np.load(path, allow_pickle=False)
-
-
 def _read_npz(path: Path) -> NDArray:
-    with np.load(path, allow_pickle=False) as arrays:
-        return arrays["image"]
+    return read_npz(path, "image")["image"]
 
 
 def _read_srgb(path: Path) -> NDArray:
     from PIL import Image
 
-    with Image.open(path) as picture:
+    data = read_file(path)
+    if path.suffix.lower() != ".png" and data.count(b"\xff\xda") > _MOST_SCANS:
+        raise ValueError(f"more than {_MOST_SCANS} scans")
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of many pixels: they are counted here
+        try:
+            # of other formats some are decoded by other programs
+            picture = Image.open(io.BytesIO(data), formats=("PNG", "JPEG"))
+        except Image.DecompressionBombError as error:
+            raise ValueError(str(error)) from None
+    with picture:
         if picture.mode[0] in "IF":
             raise ValueError("16 bits a channel; 8 are read, EXR holds more")
-        encoded = np.asarray(picture.convert("RGB"), np.float32) / 255
-    return srgb_to_linear(encoded)
+        unfolding.check_image(4 * 3 * picture.width * picture.height, len(data))
+        encoded = np.asarray(picture.convert("RGB"))
+    return srgb_to_linear(np.arange(256, dtype=np.float32) / 255)[encoded]
 
 
 def srgb_to_linear(encoded) -> NDArray:
@@ -102,6 +120,6 @@ def srgb_to_linear(encoded) -> NDArray:
 
 
 _READERS = {
-    ".exr": _read_exr, ".npy": _read_npy, ".npz": _read_npz,
+    ".exr": _read_exr, ".npy": read_npy, ".npz": _read_npz,
     ".png": _read_srgb, ".jpg": _read_srgb, ".jpeg": _read_srgb,
 }  # fmt: skip

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
@@ -27,6 +26,7 @@ from sss_tools.keys import (
 from sss_tools.loading import load_mesh
 from sss_tools.medium import UNITS
 from sss_tools.mesh import Mesh
+from sss_tools.toml_file import read_toml
 
 from .description import (
     Camera,
@@ -49,6 +49,10 @@ from .transform import Matrix, read_transform, transformed
 
 MOST_PIXELS = 2**26
 """The film keeps some 60 bytes a pixel: 4 GB at this size, 8192 x 8192."""
+
+MOST_LIGHTS, MOST_OBJECTS = 10_000, 10_000
+MOST_TRIANGLES = 2**28
+"""Of all objects together; some 400 bytes each while light is traced."""
 
 _ANYTHING = Kind("a table", lambda value: value)
 _POSITION = Kind("three numbers", to_vector, lambda v: v.shape == (3,))
@@ -148,8 +152,15 @@ def load_scene(path: str | Path) -> Scene:
     path = Path(path)
     outline = read_outline(path)
     meshes: dict[Path, Mesh] = {}
-    objects = tuple(_object(placement, meshes) for placement in outline.placements)
-    return with_hash(Scene(outline.unit, outline.camera, outline.lights, objects, path=path))
+    objects: list[SceneObject] = []
+    triangles = 0
+    for placement in outline.placements:
+        objects.append(_object(placement, meshes))
+        triangles += len(objects[-1].mesh.faces)
+        if triangles > MOST_TRIANGLES:
+            problem = f"its objects have more than {MOST_TRIANGLES} triangles up to {placement.place.name}"
+            raise InputError(path, problem, "use fewer objects or simpler meshes")
+    return with_hash(Scene(outline.unit, outline.camera, outline.lights, tuple(objects), path=path))
 
 
 def read_outline(path: str | Path) -> Outline:
@@ -161,7 +172,7 @@ def read_outline(path: str | Path) -> Outline:
         raise document.error("missing table [camera]", 'add it with "position", "target" and "fov"')
     unit = read_keys(tables["scene"], _SCENE, document.within("[scene]"))["unit"]
     camera = _camera(tables["camera"], document.within("[camera]"))
-    lights = tuple(_light(table, place) for table, place in _entries(tables["light"], "light", path))
+    lights = tuple(_light(table, place) for table, place in _entries(tables["light"], "light", path, MOST_LIGHTS))
     if not lights:
         raise document.error("there is no [[light]], so nothing would be lit", "add one")
     materials = _materials(tables["material"], unit, document)
@@ -173,21 +184,19 @@ def read_outline(path: str | Path) -> Outline:
 
 def _parse(path: Path) -> dict[str, Any]:
     try:
-        with path.open("rb") as file:
-            return tomllib.load(file)
+        return read_toml(path)
     except FileNotFoundError:
         raise InputError(path, "there is no such scene file", "check the path") from None
     except OSError as error:
         raise InputError(path, f"cannot be read ({error.strerror})", "give a readable TOML file") from None
-    # ValueError: syntax, text that is not UTF-8, and numbers of absurd length alike
-    except (ValueError, RecursionError) as error:
-        raise InputError(path, f"is no valid TOML: {error}", "correct the syntax") from None
 
 
-def _entries(tables: Any, name: str, path: Path) -> list[tuple[Any, Place]]:
+def _entries(tables: Any, name: str, path: Path, most: int) -> list[tuple[Any, Place]]:
     """The tables of an array of tables, each with its place."""
     if not isinstance(tables, list):
         raise InputError(path, f"[{name}] is one table", f"write [[{name}]], for there may be several")
+    if len(tables) > most:
+        raise InputError(path, f"it has {len(tables)} [[{name}]], more than {most}", "use fewer")
     return [(table, Place(path, f"[[{name}]] {number}")) for number, table in enumerate(tables, 1)]
 
 
@@ -249,7 +258,7 @@ def _materials(tables: Any, unit: str, document: Place) -> dict[str, Material]:
 
 def _placements(tables: Any, materials: dict[str, Material], path: Path) -> tuple[Placement, ...]:
     placements: dict[str, Placement] = {}
-    for table, place in _entries(tables, "object", path):
+    for table, place in _entries(tables, "object", path, MOST_OBJECTS):
         values = read_keys(table, _OBJECT, place)
         mesh_path = path.parent / values["mesh"]
         name = values["name"] or mesh_path.stem

@@ -66,7 +66,7 @@ def write_result(mesh: Mesh, source: Mesh, place: str) -> tuple[Path, list[str]]
     """
     suffix, data, lost = encoded(mesh, source, place)
     path = Path(place + suffix)
-    if path.exists() and not is_ours(path):
+    if path.is_symlink() or (path.exists() and not is_ours(path)):
         raise InputError(path, "exists and was not written by sss-check", "move it away, or use --fix-out")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)

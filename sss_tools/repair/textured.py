@@ -11,7 +11,13 @@ from typing import Any
 
 import numpy as np
 
+from ..loading import load_checked
 from ..mesh import Mesh
+from ..reading import read_file
+
+_IMAGES = ("PNG", "JPEG", "WEBP")
+_TEXTURES = ("baseColorTexture", "metallicRoughnessTexture", "normalTexture", "occlusionTexture", "emissiveTexture")
+_MOST_PIXELS = 2**26
 
 
 def obj_bytes(mesh: Mesh, source: Mesh, folder: Path) -> bytes:
@@ -53,9 +59,10 @@ def glb_bytes(mesh: Mesh, source: Mesh, mark: Callable[[bytes], dict[str, Any]])
 
     assert source.path is not None
     materials: dict[str, Any] = {}
-    for geometry in trimesh.load_scene(str(source.path), process=False).geometry.values():
+    for geometry in load_checked(source.path, read_file(source.path))[0].geometry.values():
         material = getattr(getattr(geometry, "visual", None), "material", None)
         if getattr(material, "name", None):
+            _drop_odd_images(material)
             materials[str(getattr(material, "name", ""))] = material
     scene = trimesh.Scene()
     for number, body in enumerate(mesh.bodies):
@@ -73,6 +80,15 @@ def glb_bytes(mesh: Mesh, source: Mesh, mark: Callable[[bytes], dict[str, Any]])
             part.vertex_normals = mesh.vertex_attributes["normal"][used]
         scene.add_geometry(part, geom_name=f"{body.name}_{number}", node_name=f"{body.name}_{number}")
     return _with_extras(scene.export(file_type="glb"), mark)
+
+
+def _drop_odd_images(material: Any) -> None:
+    """Keep the images that glTF allows. Others may be of kinds that are decoded by other programs, or far too large;
+    until now only their headers were looked at."""
+    for name in _TEXTURES:
+        image = getattr(material, name, None)
+        if image is not None and (image.format not in _IMAGES or image.width * image.height > _MOST_PIXELS):
+            setattr(material, name, None)
 
 
 def _with_extras(data: bytes, mark: Callable[[bytes], dict[str, Any]]) -> bytes:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import Any
 
+from ..errors import printable
 from ..validation.outcome import MeshReport, Outcome, RuleReport
 
 
@@ -12,7 +13,7 @@ def chunks(reports: Sequence[MeshReport]) -> Iterator[str]:
     """``path:code severity message`` for each finding; a file that was not checked has a line that says so."""
     # a name may contain line breaks; a line must not
     for report in reports:
-        yield from (" ".join(line.splitlines()) + "\n" for line in lines(report))
+        yield from (printable(" ".join(line.splitlines())) + "\n" for line in lines(report))
 
 
 def render(reports: Sequence[MeshReport]) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
 
+from ..errors import printable
 from ..validation.outcome import FixSafety, MeshReport, Outcome, RuleReport, Severity
 
 _STATES = {
@@ -56,7 +57,8 @@ def section(report: MeshReport, verbose: bool = False) -> str:
         passed = [f"{rule.code} {rule.name}" for rule in report.rules if rule.outcome == Outcome.PASS]
         lines.append(f"  passed: {', '.join(passed) or 'nothing'}")
         lines.append(f"  {report.seconds:.2f} s")
-    return "\n".join(lines) + "\n"
+    # names come from strangers, and a line must stay one
+    return "\n".join(map(printable, lines)) + "\n"
 
 
 def _headline(report: MeshReport) -> str:

@@ -51,14 +51,14 @@ def test_passes_are_rendered_and_written_and_the_checkpoint_goes(tmp_path, monke
 
 
 def test_time_allows_one_pass_at_least(tmp_path):
-    budget = Budget(0, None, seconds=0.01, started=time.time() - 100)
+    budget = Budget(0, None, seconds=0.01, started=time.monotonic() - 100)
     assert execute(ready(), tmp_path / "out.png", budget).film.passes == 1
 
 
 def test_time_stops_before_a_pass_that_would_not_fit(tmp_path, monkeypatch):
     """A clock that jumps 2 s a pass: of 7 s, three passes leave 1 s, in which no fourth fits."""
     clock = [1000.0]
-    monkeypatch.setattr(job.time, "time", lambda: clock[0])
+    monkeypatch.setattr(job.time, "monotonic", lambda: clock[0])
     renderer = ready()
     run = renderer.run
 
@@ -199,7 +199,7 @@ def test_a_preview_that_can_no_longer_be_written_does_not_end_the_render(tmp_pat
 def test_writing_again_and_again_takes_a_small_share_of_the_time(tmp_path, monkeypatch):
     """A clock that writing moves on by 3 s: the next is due 60 s later."""
     clock = [1000.0]
-    monkeypatch.setattr(job.time, "time", lambda: clock[0])
+    monkeypatch.setattr(job.time, "monotonic", lambda: clock[0])
     monkeypatch.setattr(job.image, "write", lambda *_: clock.__setitem__(0, clock[0] + 3))
     kept, renderer = job._Refreshed(tmp_path / "preview.png"), ready()
     kept.refresh(renderer, Budget())
