@@ -100,6 +100,7 @@ class TaskMaker:
             diff=options.diff,
             waive=self._waive,
             cache=not options.no_cache,
+            isolated=options.isolated,
         )
         return Task(
             mesh,

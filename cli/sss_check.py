@@ -106,7 +106,7 @@ def _parser() -> ArgumentParser:
     add("--max-memory", type=_size, metavar="SIZE", help="memory a mesh may take: 500M, 2G (default: half of "
         "the machine's)")  # fmt: skip
     add("--no-cache", action="store_true", help="check again what was checked before")
-    add("--isolated", action="store_true", help="read no configuration file")
+    add("--isolated", action="store_true", help="read no configuration file, apply no waivers of records")
     add("--exit-zero", action="store_true", help="findings do not change the exit status")
     return parser
 

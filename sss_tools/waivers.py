@@ -12,8 +12,8 @@ from .validation.settings import Settings
 def waive(report: MeshReport, path: str | Path, settings: Settings) -> dict[str, str]:
     """Turn the accepted findings of a report into ``waived`` ones.
 
-    Accepted is what the record beside the mesh waives for this geometry, and what ``settings.waive`` waives in
-    this run. Returns what a record of this geometry is to hold, code -> reason: the waivers it had, and those of
+    Accepted is what the record beside the mesh waives for this geometry, unless ``settings.isolated``, and what
+    ``settings.waive`` waives in this run. Returns what a record of this geometry is to hold, code -> reason: the waivers it had, and those of
     this run that met a finding. What could not be applied is a warning of the report.
     """
     sidecar = record_path(path)
@@ -31,7 +31,9 @@ def waive(report: MeshReport, path: str | Path, settings: Settings) -> dict[str,
                 f"{sidecar}: the waivers of {', '.join(foreign)} belong to other geometry and are {lost}: "
                 "look at the mesh and waive them again"
             )
-    accepted = {**recorded, **settings.waive}
+    if recorded and settings.isolated:
+        report.warnings.append(f"{sidecar}: its waivers of {', '.join(sorted(recorded))} are not applied (--isolated)")
+    accepted = {**({} if settings.isolated else recorded), **settings.waive}
     for rule in report.findings:
         if rule.code in accepted and rule.code not in UNUSABLE:
             rule.outcome, rule.reason = Outcome.WAIVED, accepted[rule.code]
@@ -39,4 +41,5 @@ def waive(report: MeshReport, path: str | Path, settings: Settings) -> dict[str,
     for code in settings.waive:
         if code not in met:
             report.warnings.append(f"{report.path}: there is nothing to waive: {code} found nothing")
-    return {code: reason for code, reason in accepted.items() if code in recorded or code in met}
+    kept = {**recorded, **settings.waive}
+    return {code: reason for code, reason in kept.items() if code in recorded or code in met}

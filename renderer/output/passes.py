@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import reprlib
 from collections.abc import Iterable
 
 Ranges = tuple[tuple[int, int], ...]
@@ -42,5 +43,5 @@ def checked(ranges: Iterable[Iterable[int]]) -> Ranges:
     """Ranges as they come from a file. Raises ValueError for what are no sorted, disjoint ranges of passes."""
     result = tuple((int(start), int(stop)) for start, stop in ranges)
     if any(not 0 <= start < stop for start, stop in result) or united(result, ()) != result:
-        raise ValueError(f"{result} are no ranges of passes")
+        raise ValueError(f"{reprlib.repr(result)} are no ranges of passes")
     return result

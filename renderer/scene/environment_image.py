@@ -94,7 +94,7 @@ def _read_npz(path: Path) -> NDArray:
 
 
 def _read_srgb(path: Path) -> NDArray:
-    from PIL import Image
+    from PIL import Image, UnidentifiedImageError
 
     data = read_file(path)
     if path.suffix.lower() != ".png" and data.count(b"\xff\xda") > _MOST_SCANS:
@@ -104,6 +104,8 @@ def _read_srgb(path: Path) -> NDArray:
         try:
             # of other formats some are decoded by other programs
             picture = Image.open(io.BytesIO(data), formats=("PNG", "JPEG"))
+        except UnidentifiedImageError:
+            raise ValueError("it is neither PNG nor JPEG") from None
         except Image.DecompressionBombError as error:
             raise ValueError(str(error)) from None
     with picture:

@@ -27,6 +27,7 @@ class Settings:
     record          whether to write MESH.sss.json beside each mesh
     waive           code -> reason: findings that the user accepts, beside those waived in the record
     cache           whether to look for the findings among, and keep them with, those of earlier runs
+    isolated        whether to leave what lies beside a mesh without effect: its record's waivers do not count
     fix             "safe" or "unsafe": repair each mesh and check the result; "" leaves meshes alone
     diff            repair, but write nothing
     outputs         path of a mesh -> where its repaired copy goes, without extension (``repair.plan_outputs``)
@@ -42,6 +43,7 @@ class Settings:
     record: bool = False
     waive: Mapping[str, str] = field(default_factory=dict)
     cache: bool = False
+    isolated: bool = False
     fix: Literal["", "safe", "unsafe"] = ""
     diff: bool = False
     outputs: Mapping[str, str] = field(default_factory=dict)

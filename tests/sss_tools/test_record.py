@@ -138,3 +138,14 @@ def test_the_hash_sees_geometry_alone():
     assert geometry_hash(Mesh(np.zeros((3, 3)), np.zeros((0, 3), int))) != geometry_hash(
         Mesh(np.zeros((0, 3)), np.zeros((0, 3), int))
     )
+
+
+def test_a_record_is_not_written_through_a_link(tmp_path):
+    """Whoever can put a link beside a mesh could otherwise choose what ``--record`` overwrites."""
+    target, path = tmp_path / "precious", tmp_path / "ball.ply"
+    target.write_text("as it was")
+    write_mesh(shapes.icosphere(1.0, 1), path)
+    record_path(path).symlink_to(target)
+    report = check_file(path, Settings(record=True))
+    assert target.read_text() == "as it was" and record_path(path).is_symlink()
+    assert any("could not be written" in warning for warning in report.warnings)

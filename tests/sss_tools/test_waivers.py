@@ -49,3 +49,12 @@ def test_a_new_reason_replaces_the_old_one(inverted):
         check_file(inverted, Settings(record=True, waive={"SSS204": reason}))
     (rule,) = check_file(inverted).waived
     assert rule.reason == "second"
+
+
+def test_an_isolated_check_applies_no_waiver_of_a_record_says_so_and_keeps_it(inverted):
+    check_file(inverted, Settings(record=True, waive={"SSS204": "planted"}))
+    assert check_file(inverted).findings == []
+    report = check_file(inverted, Settings(isolated=True, record=True))
+    assert [rule.code for rule in report.findings] == ["SSS204"]
+    assert any("SSS204 are not applied" in warning for warning in report.warnings)
+    assert check_file(inverted).findings == []
