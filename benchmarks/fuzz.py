@@ -1,6 +1,9 @@
-"""Does any damaged file make the check crash, hang, raise, or print?
+"""Does any damaged file make the check or the renderer crash, hang, raise, or print?
 
-    python benchmarks/fuzz.py --count 20000 -o build/fuzz
+    python benchmarks/fuzz.py --count 20000 --render-count 20000 -o build/fuzz
+
+Meshes (``fuzz_inputs``) are checked with all rules; scenes, environment images and parts of renders
+(``fuzz_scenes``) are read, and made ready to be rendered.
 
 Runs in rounds; each round's outcome is in OUT/state.json before the next begins, so that a run that was stopped goes
 on where it was. Inputs that crashed, hung or raised are kept in OUT. With --page the table goes to that file.
@@ -12,6 +15,7 @@ import argparse
 import contextlib
 import json
 import os
+import resource
 import sys
 import tempfile
 import time
@@ -77,13 +81,19 @@ def diverted_stderr() -> Iterator[IO[bytes]]:
         os.close(original)
 
 
+def most_memory() -> int:
+    """Bytes that the largest process held that this one has waited for."""
+    return 1024 * resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss
+
+
 def page(state: dict) -> str:
     """The table in Markdown."""
     total: Counter[str] = Counter()
     lines = [
         "# Fuzzing",
         "",
-        f"{state['next']} damaged files of seed {state['seed']}, each checked with all rules "
+        f"{state['next']} damaged meshes of seed {state['seed']}, each checked with all rules, and "
+        f"{state['render_next']} damaged scenes, skies and parts of renders, each made ready to be rendered "
         f"(at most {TIMEOUT:g} s and {MEMORY >> 30} GiB): `python benchmarks/fuzz.py`.",
         "",
         "| format | " + " | ".join(COLUMNS) + " |",
@@ -93,8 +103,10 @@ def page(state: dict) -> str:
         total.update(counts)
         lines.append(f"| {kind} | " + " | ".join(str(counts.get(column, 0)) for column in COLUMNS) + " |")
     lines.append("| all | " + " | ".join(str(total[column]) for column in COLUMNS) + " |")
-    lines += ["", f"Rounds of {ROUND} in which anything was printed to stderr: {state['printed']}."]
-    lines += ["", "*usable*: still a mesh, checked to the end. *refused*: SSS602, SSS701 or SSS702, status 2.", ""]
+    lines += ["", f"Rounds of {ROUND} in which anything was printed to stderr: {state['printed']}. Most memory of any "
+              f"process, libraries included: {state['memory'] >> 20} MiB."]  # fmt: skip
+    lines += ["", "*usable*: checked, or made ready, to the end. *refused*: SSS602, SSS701 or SSS702 and status 2; of "
+              "scenes, skies and parts: one line, and status 2.", ""]  # fmt: skip
     return "\n".join(lines)
 
 
@@ -102,6 +114,7 @@ def main() -> int:
     """Run on to ``--count`` inputs; status 1 where any crashed, hung or raised."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--count", type=int, default=20_000)
+    parser.add_argument("--render-count", type=int, default=20_000)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--jobs", type=int)
     parser.add_argument("-o", "--out", type=Path, default=Path("build/fuzz"))
@@ -109,9 +122,8 @@ def main() -> int:
     options = parser.parse_args()
     options.out.mkdir(parents=True, exist_ok=True)
     file = options.out / "state.json"
-    state = (
-        json.loads(file.read_text()) if file.exists() else {"seed": options.seed, "next": 0, "kinds": {}, "printed": 0}
-    )
+    state = {"seed": options.seed, "next": 0, "render_next": 0, "kinds": {}, "printed": 0, "memory": 0}
+    state |= json.loads(file.read_text()) if file.exists() else {}
     if state["seed"] != options.seed:
         sys.exit(f"{file} belongs to seed {state['seed']}")
     start, begun = time.monotonic(), state["next"]
@@ -133,10 +145,26 @@ def main() -> int:
                     path.rename(options.out / path.name)
                     reasons = {rule.reason for rule in report.rules if rule.raised} or {report.error}
                     print(f"{result}: {options.out / path.name}: {sorted(map(str, reasons))}")
-        state["next"] = numbers.stop
+        state["next"], state["memory"] = numbers.stop, max(state["memory"], most_memory())
         write_atomically(file, json.dumps(state, indent=1).encode())
         rate = (state["next"] - begun) / (time.monotonic() - start)
         print(f"{state['next']} of {options.count}, {rate:.0f} a second", file=sys.stderr)
+    while state["render_next"] < options.render_count:
+        import fuzz_scenes
+
+        numbers = range(state["render_next"], min(state["render_next"] + ROUND, options.render_count))
+        with diverted_stderr() as printed:
+            found, memory = fuzz_scenes.outcomes(options.seed, numbers)
+        printed.seek(0)
+        state["printed"] += bool(printed.read())
+        for number, (kind, result) in zip(numbers, found, strict=True):
+            counts = state["kinds"].setdefault(kind, {})
+            for column in ("inputs", result):
+                counts[column] = counts.get(column, 0) + 1
+            if result in FAULTS:
+                print(f"{result}: {kind}, number {number}")
+        state["render_next"], state["memory"] = numbers.stop, max(state["memory"], memory)
+        write_atomically(file, json.dumps(state, indent=1).encode())
     print(page(state))
     if options.page is not None:
         options.page.write_text(page(state))

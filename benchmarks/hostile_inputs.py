@@ -310,14 +310,14 @@ def _(folder: Path) -> Path:
 
 
 _DAE = (
-    '<COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1"><asset><up_axis>Y_UP</up_axis></asset>'
-    '<library_geometries><geometry id="g"><mesh><source id="s"><float_array id="f" count="12">0 0 0 1 0 0 0 1 0 0 0 1'
-    '</float_array><technique_common><accessor source="#f" count="4" stride="3"><param name="X" type="float"/>'
-    '<param name="Y" type="float"/><param name="Z" type="float"/></accessor></technique_common></source>'
-    '<vertices id="v"><input semantic="POSITION" source="#s"/></vertices><triangles count="4"><input semantic="VERTEX" '
-    'source="#v" offset="0"/><p>0 2 1 0 1 3 0 3 2 1 2 3</p></triangles></mesh></geometry></library_geometries>'
-    '<library_nodes>{}</library_nodes><library_visual_scenes><visual_scene id="w">{}</visual_scene>'
-    '</library_visual_scenes><scene><instance_visual_scene url="#w"/></scene></COLLADA>'
+    '<COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1"><asset><up_axis>Y_UP</up_ax'
+    'is></asset><library_geometries><geometry id="g"><mesh><source id="s"><float_array id="f" count="12">0 0 0'
+    ' 1 0 0 0 1 0 0 0 1</float_array><technique_common><accessor source="#f" count="4" stride="3"><param name='
+    '"X" type="float"/><param name="Y" type="float"/><param name="Z" type="float"/></accessor></technique_comm'
+    'on></source><vertices id="v"><input semantic="POSITION" source="#s"/></vertices><triangles count="4"><inp'
+    'ut semantic="VERTEX" source="#v" offset="0"/><p>0 2 1 0 1 3 0 3 2 1 2 3</p></triangles></mesh></geometry>'
+    '</library_geometries><library_nodes>{}</library_nodes><library_visual_scenes><visual_scene id="w">{}</vis'
+    'ual_scene></library_visual_scenes><scene><instance_visual_scene url="#w"/></scene></COLLADA>'
 )
 
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import math
 import sys
+import tempfile
 import time
 import warnings
 from collections.abc import Callable
@@ -27,6 +27,8 @@ from .scene.holes import HoleReport, in_mesh_units
 DEFAULT_PASSES = 64
 REFRESH_EVERY, REFRESH_SHARE = 1.0, 0.05
 """Checkpoint and preview are written at most once in so many seconds, and take at most this share of the time each."""
+RETRY_EVERY = 30.0
+"""Seconds until what could not be written is tried again: somebody may have made room on a full disk."""
 LEAST_PASSES_FOR_ERROR = 4
 """A target error is not met by fewer: of two samples the square root of the variance is 20 % too small in the mean, of
 four 8 %."""
@@ -119,7 +121,10 @@ def execute(
     def write() -> Picture:
         with renderer.stages.stage("write"):
             picture = renderer.picture(time.monotonic() - budget.started, aovs)
-            image.write(output, picture)
+            try:
+                image.write(output, picture)
+            except InputError as error:
+                raise _rescued(error, picture, checkpoint) from None
         if preview is not None:
             _Refreshed(preview).refresh(renderer, budget)
         return picture
@@ -171,11 +176,13 @@ class _Refreshed:
     """A file that is written again and again, whole or not at all, from ``due`` on.
 
     seconds  what writing it took the last time
+    failed   whether it could not be written once
     """
 
     path: Path
     due: float = 0.0
     seconds: float = 0.0
+    failed: bool = False
 
     def refresh(self, renderer: Renderer, budget: Budget) -> None:
         """Write the film so far, if it is time."""
@@ -186,8 +193,9 @@ class _Refreshed:
             image.write(self.path, renderer.picture(start - budget.started))
         except InputError as error:
             # the render goes on without
-            warnings.warn(f"{error.line()}; it is kept up to date no longer", stacklevel=2)
-            self.due = math.inf
+            if not self.failed:
+                warnings.warn(f"{error.line()}; it is tried again every {RETRY_EVERY:g} s", stacklevel=2)
+            self.failed, self.due = True, time.monotonic() + RETRY_EVERY
             return
         end = time.monotonic()
         self.seconds = end - start
@@ -197,6 +205,19 @@ class _Refreshed:
 def checkpoint_path(output: Path) -> Path:
     """Where the film of an unfinished render to ``output`` is kept."""
     return output.with_name(f"{output.name}.unfinished.npz")
+
+
+def _rescued(error: InputError, picture: Picture, checkpoint: Path) -> InputError:
+    """Keep what was rendered for an output that cannot be written, beside it or in the folder for temporary files;
+    the error to raise."""
+    for place in (checkpoint, Path(tempfile.mkdtemp(prefix="sss-render-"), checkpoint.name)):
+        try:
+            image.write(place, picture)
+        except InputError:
+            continue
+        remedy = "use --resume" if place == checkpoint else f"move it to {checkpoint} and use --resume"
+        return InputError(error.subject, f"{error.problem}; all passes are in {place}", f"make room, then {remedy}")
+    return error
 
 
 def _resumed(blank: Film, output: Path, checkpoint: Path) -> Film:

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import math
 import os
+import struct
 import zipfile
+import zlib
 from pathlib import Path
 from typing import IO
 from zipfile import BadZipFile
@@ -17,7 +19,7 @@ from .errors import InputError
 from .reading import opened
 
 ARRAY_ERRORS = (OSError, ValueError, KeyError, EOFError, AttributeError, TypeError, OverflowError, RuntimeError,
-                NotImplementedError, BadZipFile)  # fmt: skip
+                NotImplementedError, IndexError, BadZipFile, struct.error, zlib.error)  # fmt: skip
 """What broken files make of NumPy, zipfile, and of those who take the arrays for what they are not."""
 
 MOST_ARRAYS = 1000
@@ -57,7 +59,10 @@ def _array(file: IO[bytes], size: int) -> NDArray:
     }.get(version)
     if read_header is None:
         raise ValueError(f"version {version} of the format is unknown")
-    shape, fortran, kind = read_header(file)
+    try:
+        shape, fortran, kind = read_header(file)
+    except Exception as error:  # a literal of Python, so whatever its parser raises
+        raise ValueError(f"its header makes no sense ({type(error).__name__})") from None
     if kind.hasobject:
         raise ValueError("it holds objects, not numbers")
     promised = math.prod(shape) * kind.itemsize

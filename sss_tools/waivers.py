@@ -13,8 +13,8 @@ def waive(report: MeshReport, path: str | Path, settings: Settings) -> dict[str,
     """Turn the accepted findings of a report into ``waived`` ones.
 
     Accepted is what the record beside the mesh waives for this geometry, unless ``settings.isolated``, and what
-    ``settings.waive`` waives in this run. Returns what a record of this geometry is to hold, code -> reason: the waivers it had, and those of
-    this run that met a finding. What could not be applied is a warning of the report.
+    ``settings.waive`` waives in this run. Returns what a record of this geometry is to hold, code -> reason: the
+    waivers it had, and those of this run that met a finding. What could not be applied is a warning of the report.
     """
     sidecar = record_path(path)
     recorded: dict[str, str] = {}

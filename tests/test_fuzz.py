@@ -22,7 +22,7 @@ def fuzz(monkeypatch):
     import fuzz
 
     yield fuzz
-    for name in ("fuzz", "fuzz_inputs"):
+    for name in ("fuzz", "fuzz_inputs", "fuzz_scenes", "hostile", "hostile_inputs"):
         sys.modules.pop(name, None)
 
 
@@ -67,3 +67,15 @@ def test_the_outcome_of_an_input_can_be_a_fault(fuzz):
     report = report_not_checked("a.ply", "x", Settings())
     report.rules = [RuleReport("SSS101", "open-boundary", Severity.ERROR, Outcome.NOT_RUN, raised=True)]
     assert fuzz.outcome(report) == "raised"
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="forks")
+def test_no_damaged_scene_sky_or_part_makes_the_renderer_crash_hang_or_raise(fuzz, capfd):
+    import fuzz_scenes
+
+    found, memory = fuzz_scenes.outcomes(SEED, range(210))
+    assert [entry for entry in enumerate(found) if entry[1][1] in fuzz.FAULTS] == []
+    assert capfd.readouterr() == ("", "")
+    outcomes = Counter(outcome for _, outcome in found)
+    assert outcomes["usable"] > 10 and outcomes["refused"] > 50 and memory < fuzz_scenes.MEMORY
+    assert {kind for kind, _ in found} == set(fuzz_scenes.valid())

@@ -17,7 +17,9 @@ from sss_tools.record import (
     record_path,
     write_record,
 )
-from sss_tools.validation.run import check_mesh
+from sss_tools.validation.run import check_file, check_mesh
+from sss_tools.validation.settings import Settings
+from sss_tools.writing import write_mesh
 
 
 @pytest.fixture
