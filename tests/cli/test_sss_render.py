@@ -2,6 +2,7 @@
 
 import json
 import signal
+import sys
 import time
 from dataclasses import replace
 from pathlib import Path
@@ -436,3 +437,12 @@ def test_export_refuses_options_that_it_would_ignore(workplace, capsys, option):
     assert main(["scene.toml", "--export", "mitsuba", "-o", "other.xml", *option]) == 2
     assert f"{option[0]}: says nothing to --export mitsuba" in capsys.readouterr().err
     assert not Path("other.xml").exists()
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="limits of memory as Linux keeps them")
+def test_too_little_memory_is_one_line(workplace, capsys):
+    """The sums of 9000 x 7000 pixels alone take 3 GB."""
+    render("--size", "9000x7000", "--passes", 1, "--max-memory", "2G", status=2)
+    error = capsys.readouterr().err
+    assert "out of memory" in error and "--max-memory" in error and error.count("\n") == 1
+    assert not Path("out.npz").exists()
