@@ -86,6 +86,10 @@ def damaged(seed: int, number: int) -> tuple[str, str, bytes]:
 
 def outcomes(seed: int, numbers: range) -> tuple[list[tuple[str, str]], int]:
     """Kind and outcome of each input, as in ``fuzz``, and the most memory any batch held, in bytes."""
+    import hostile  # noqa: F401 - before the forks, so that each is spared the imports
+
+    import renderer.render  # noqa: F401
+
     found: list[tuple[str, str]] = []
     most = 0
     for start in range(numbers.start, numbers.stop, BATCH):
