@@ -12,6 +12,7 @@ from sss_tools.errors import InputError
 from sss_tools.keys import did_you_mean
 from sss_tools.loading import SUFFIXES, load_mesh
 from sss_tools.mesh import Mesh
+from sss_tools.reading import read_file
 from sss_tools.record import Record, geometry_hash, read_record, record_path
 from sss_tools.validation.outcome import FixSafety, MeshReport, Outcome, RuleReport, Severity
 from sss_tools.validation.rule import Context, Subject, all_rules
@@ -223,7 +224,7 @@ def _recorded(path: Path, mesh: Mesh, record: Record, wanted: tuple[str, ...]) -
 
 def _read_json(path: Path) -> dict[str, Any]:
     try:
-        data = json.loads(path.read_bytes())
+        data = json.loads(read_file(path))
     except OSError as error:
         raise InputError(path, f"cannot be read ({error.strerror})", "name a record of sss-check --record") from None
     except (ValueError, RecursionError) as error:

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from sss_tools.errors import InputError
+from sss_tools.reading import read_file
 
 from .command import ArgumentParser, complain, progress, run
 
@@ -160,7 +161,7 @@ def _parser() -> ArgumentParser:
 def _read_picture(path: Path) -> bytes:
     """The bytes of a PNG file. Raises InputError for what is none."""
     try:
-        data = path.read_bytes()
+        data = read_file(path)
     except OSError as error:
         raise InputError(path, f"cannot be read ({error.strerror})", "name a PNG of sss-render") from None
     if not data.startswith(b"\x89PNG\r\n\x1a\n"):
