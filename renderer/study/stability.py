@@ -149,7 +149,8 @@ class Found:
         if start is not None:
             ranges.append((start, places[-1]))
         back: Callable = np.exp if self.study.log else (lambda x: x)
-        return [(float(back(low)), float(back(high))) for low, high in ranges]
+        ends = {places[0]: values[0], places[-1]: values[-1]}  # without the roundings of there and back
+        return [(float(ends.get(low, back(low))), float(ends.get(high, back(high)))) for low, high in ranges]
 
     def unsure(self, method: str, bound: float = BOUND) -> bool:
         """Whether noise could take an error to the other side of the bound, at any value."""

@@ -56,8 +56,7 @@ def _errors(axis: Any, found: Found) -> None:
                     axis.plot(edge, BOUND, "|", color=colour, markersize=16, markeredgewidth=2)
     axis.axhline(BOUND, color="#888888", linestyle=(0, (4, 3)), linewidth=0.9)
     axis.annotate(f"usable below {100 * BOUND:g} %", (1, BOUND), xycoords=("axes fraction", "data"), xytext=(0, 3),
-                  textcoords="offset points", ha="right", fontsize=8, color="#666666",
-                  bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.5, "alpha": 0.8})  # fmt: skip
+                  textcoords="offset points", ha="right", fontsize=8, color="#666666", zorder=0)  # fmt: skip
     axis.set_ylim(bottom=max(0.7 * least, 0.9 * LEAST_SHOWN))
     axis.set_ylabel("relative RMS bias")
     axis.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), fontsize=8)
@@ -70,6 +69,8 @@ def _price(axis: Any, found: Found) -> None:
     values = [step.value for step in found.steps]
     seconds = [step.outcome("path").seconds_to_target for step in found.steps]
     axis.plot(values, seconds, color=COLOURS["path"], marker="o", markersize=4)
+    # a decade at least, so that little looks like little
+    axis.set_ylim(0.4 * np.nanmin(seconds), 2.5 * np.nanmax(seconds))
     axis.set_ylabel(f"path: CPU s to {100 * TARGET:g} %")
     log_ticks(axis.yaxis)
 

@@ -127,19 +127,17 @@ def bounds(found: Found, method: str) -> str:
     ranges, unsure = found.usable(method), "~ " * found.unsure(method)
     if not ranges:
         return f"{unsure}nowhere"
-    low, high = 1.0001 * found.steps[0].value, 0.9999 * found.steps[-1].value
-    if low < 0:
-        low = 0.9999 * found.steps[0].value
+    low, high = found.steps[0].value, found.steps[-1].value
     words = []
     for start, end in ranges:
         if start <= low and end >= high:
             words.append("all")
         elif start <= low:
-            words.append(f"to {end:.2g}")
+            words.append(f"to {_rounded(end)}")
         elif end >= high:
-            words.append(f"from {start:.2g}")
+            words.append(f"from {_rounded(start)}")
         else:
-            words.append(f"{start:.2g} to {end:.2g}")
+            words.append(f"{_rounded(start)} to {_rounded(end)}")
     return unsure + ", ".join(words)
 
 
@@ -207,6 +205,11 @@ def _promises(broken: Sequence[tuple]) -> list[str]:
             f"{100 * choice.allowed:.2g} % | {100 * (choice.predicted or 0):.2g} % |"
         )
     return [*lines, ""]
+
+
+def _rounded(value: float) -> str:
+    """To two figures."""
+    return f"{float(f'{value:.2g}'):g}"
 
 
 def _values(values: Iterable[float]) -> str:
