@@ -47,7 +47,7 @@ def _parser() -> Any:
         "Mitsuba 3 (DRJIT_LIBLLVM_PATH should name an LLVM library) and FLIP.",
     )  # fmt: skip
     speed.add_argument("scenes", nargs="+", type=Path, metavar="SCENE", help="scene (.toml) or mesh")
-    speed.add_argument("--minutes", type=_positive, help="a scene, about (default: 9.5; 2.5 with --quick)")
+    speed.add_argument("--minutes", type=_positive, help="a scene, about (default: 9; 2.5 with --quick)")
     speed.add_argument("--turns", type=_turns, help="runs of every point (default: 3; 2 with --quick)")
     speed.add_argument("--threads", type=_turns, metavar="N", help="of our renderer (default: one a core)")
     speed.add_argument("--no-peers", action="store_true", help="leave Mitsuba out")

@@ -187,7 +187,7 @@ class Lab:
         }
 
     def _mitsuba(self, task: Task) -> dict:
-        scene = self.folder / MITSUBA / f"{task.scene}.xml"
+        scene = self.folder / MITSUBA / f"{task.scene}-{_digest(Path(task.source))}.xml"
         export = [task.source, "--export", "mitsuba", "-o", str(scene)]
         if not scene.is_file():
             scene.parent.mkdir(exist_ok=True)
@@ -246,7 +246,10 @@ def arguments(task: Task) -> list[str]:
 def _timed(command: Sequence[str], task: Task) -> float:
     """Run a command to its end; its seconds on all cores. What it says is shown only if it fails."""
     begun, start = _children_cpu(), time.perf_counter()
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    # whatever folder this is started in, the commands are those beside this file
+    paths = [str(Path(__file__).parents[2]), *filter(None, [os.environ.get("PYTHONPATH")])]
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(paths)}
+    done = subprocess.run(command, capture_output=True, text=True, check=False, env=environment)
     if done.returncode:
         words = (done.stderr.strip().splitlines() or [f"exit status {done.returncode}"])[-1]
         if task.method == "mitsuba":

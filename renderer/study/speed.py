@@ -44,7 +44,7 @@ class Effort:
     qualities  of ``auto``
     """
 
-    seconds: float = 570.0
+    seconds: float = 540.0
     turns: int = 3
     qualities: tuple[float, ...] = (0.0, 0.25, 0.5, 0.75, 1.0)
 
@@ -177,19 +177,22 @@ def measure(
     later = sum(one.seconds for one in first)
     halves = []
     for half, seed in enumerate(REFERENCE_SEEDS):
-        known = [one for one in lab.runs.values() if one.task.scene == scene and one.task.seed == seed]
-        halves.append(
-            run(known[0].task if known else Task(scene, source, "reference", count, half, seed),
-                (2 - half) * REFERENCE_SHARE / 2 * effort.seconds + (effort.turns - 1) * later)
-        )  # fmt: skip
+        left = (2 - half) * REFERENCE_SHARE / 2 * effort.seconds + (effort.turns - 1) * later
+        halves.append(run(Task(scene, source, "reference", count, half, seed), left))
 
     runs = list(first)
     expected_of = {one.task.name: one.seconds for one in first}
     left = (effort.turns - 1) * later
     for turn in range(1, effort.turns):
         for one in further[:: -1 if turn % 2 else 1]:
-            runs.append(run(task(one.method, one.passes, turn, one.quality), left))
             left -= expected_of[one.name]
+            try:
+                if one.method != "mitsuba" or without_peer is None:
+                    runs.append(run(task(one.method, one.passes, turn, one.quality), left + expected_of[one.name]))
+            except PeerFailed as words:
+                without_peer = f"it failed: {words}"
+    if without_peer is not None:
+        runs = [one for one in runs if one.task.method != "mitsuba"]
     return judged(lab, scene, source, runs, (halves[0], halves[1]), without_peer)
 
 

@@ -51,7 +51,7 @@ def make(
         stability_chart.draw(found[-1], folder, study.name)
         write_csv(folder / "stability.csv", COLUMNS, (row for one in found for row in rows(one)))
         write(folder / "stability.md", page(found, quick).encode())
-        write(folder / "limits.md", limits(found).encode())
+        write(folder / "limits.md", limits(found, quick).encode())
     return found
 
 
@@ -174,12 +174,14 @@ def _study(found: Found) -> list[str]:
     return [*lines, ""]
 
 
-def limits(found: Sequence[Found]) -> str:
+def limits(found: Sequence[Found], quick: bool) -> str:
     """The page of bounds: the table, then each study in which a method leaves its bound."""
     lines = [
         "# Limits", "",
         "Where each method fails, marked from measured data (`sss-chart stability`). "
-        f"{sentence(machine())}.", "",
+        f"{sentence(machine())}." + " Quick run: every other value, short renders." * quick, "",
+        "How errors are measured is said in accuracy.md; holes, noise and far-off meshes are judged by the clean mesh, "
+        "so that path can be wrong there, and it is told so by sss-check and by warnings of rare events.", "",
         *_table(found),
         "## What `auto` does not handle", "",
     ]  # fmt: skip
