@@ -111,7 +111,7 @@ class Step:
 
 @dataclass(frozen=True)
 class Found:
-    """A study's sweep, done."""
+    """A study's sweep, done; steps in the order of their values."""
 
     study: Study
     steps: tuple[Step, ...]

@@ -228,4 +228,4 @@ def sweep(bench: Bench, study: Study, advance: Callable[[Step, bool], None] = la
         made = bench.known(study, value) is None
         steps.append(bench.step(study, value))
         advance(steps[-1], made)
-    return Found(study, tuple(steps))
+    return Found(study, tuple(sorted(steps, key=lambda step: step.value)))

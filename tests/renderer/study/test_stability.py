@@ -107,6 +107,15 @@ def test_commands_of_a_row_make_the_pictures_it_was_judged_by(measured, monkeypa
     assert again.squared == pytest.approx(told["diffuse"]["squared_bias"], rel=1e-6)
 
 
+def test_steps_come_in_the_order_of_their_values_whatever_that_of_the_study(tmp_path, monkeypatch):
+    """A study may begin at the harmless end; bounds are read from small to large."""
+    bench = stability_bench.Bench(tmp_path, stability_bench.FULL)
+    steps = {step.value: step for step in found([1, 100], [0.05, 0.2]).steps}
+    monkeypatch.setattr(bench, "known", lambda study, value: steps[value])
+    study = Study("down", "?", "x", (100, 1), lambda value: None, lambda: None)
+    assert bounds(stability_bench.sweep(bench, study), "plumb") == "to 10"
+
+
 @pytest.mark.slow
 def test_what_was_measured_is_not_measured_again(measured, monkeypatch):
     result, folder, study = measured
