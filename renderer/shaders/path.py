@@ -37,9 +37,9 @@ from .refracted_light import light_through_facets
 NAME = "path"
 
 _BEYOND, _CLEAR = RAY_OFFSET, np.float32(2.5e-7)
-"""How far rays look beyond a collision, and how far collisions stay from the surface before them, unit-size frame. Places
-are rounded by up to 2.1e-7 (see ``RAY_OFFSET``), so that one path in some thousand of a medium with a mean free path of
-1e-4 would collide outside, and leak. Flights more oblique than 1 to 4 are left to chance."""
+"""How far rays look beyond a collision, and how far collisions stay from the surface before them, unit-size frame.
+Places are rounded by up to 2.1e-7 (see ``RAY_OFFSET``): some would lie outside, from where paths leak. Flights more
+oblique than 1 to 4 are left to chance."""
 
 Float32 = NDArray[np.float32]
 

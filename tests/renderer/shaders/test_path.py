@@ -80,7 +80,7 @@ def leaks_of_a_ball_of_ten_thousand_mean_free_paths() -> int:
 
 
 def test_collisions_beside_the_surface_stay_inside_the_densest_bodies():
-    """Rounding would take some of them through it. Without leaks 1e-5 of the paths mean 3; 9 are seen one time in 300."""
+    """Rounding would take some of them through it. Allowed are 1e-5, which means 3; 9 are seen one time in 300."""
     assert leaks_of_a_ball_of_ten_thousand_mean_free_paths() < 9
 
 
