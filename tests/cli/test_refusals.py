@@ -187,7 +187,6 @@ def test_an_unwritable_report_before_anything_is_rendered(refused, workplace, re
         ["scene.toml", "-o", "out.png", "--aov", "depht"],
         ["scene.toml", "-o", "out.png", "--material", "marble"],
         ["ball.ply", "-o", "out.png", "--material", "marbel"],
-        ["scene.toml", "-o", "out.png", "--hole-handling", "cap"],
         ["scene.toml", "-o", "out.png", "--scheduler", "tcp://here:1"],
         ["scene.toml", "-o", "out.png", "--no-such-option"],
         ["merge", "-o", "out.png"],
