@@ -31,7 +31,7 @@ BINS = 512
 SMALLEST, LARGEST = 1.0, 128.0
 """Radii of the tables in mean free paths of the densest channel. A ball of 1 stands for 1.4 collisions, of 2 for 3.7,
 of 128 for eight thousand, and hardly any path needs a larger one."""
-_FORMULA = "ball jump 1"
+_FORMULA = "ball jump 3"
 _STEPS_PER_OCTAVE = 4
 _COUNT = int(np.log2(LARGEST / SMALLEST)) * _STEPS_PER_OCTAVE + 1
 _SHIFT = 23 - 2  # all but the exponent and two bits of the mantissa of a float32
@@ -165,7 +165,8 @@ def _row(radius: float, ratios: tuple[float, ...], albedos: tuple[float, ...]) -
     Column 0 is unscattered light; the others are bins of equal probability under the channels' mean density.
     """
     angle, shares, straight, collisions = _channels(radius, ratios, albedos)
-    total = shares[:, -1] + straight
+    # nothing is lost without absorption: known better than solved
+    total = np.where(np.array(albedos) == 1, 1, shares[:, -1] + straight)
     chance = straight.mean() / total.mean()
     mixture = shares.mean(axis=0)
     edges = np.interp(np.linspace(0, mixture[-1], BINS + 1), mixture, angle)
@@ -175,6 +176,10 @@ def _row(radius: float, ratios: tuple[float, ...], albedos: tuple[float, ...]) -
     lower, width = np.concatenate([[1], cosine[1:]]), np.concatenate([[0], cosine[:-1] - cosine[1:]])
     weights = masses * BINS / max(1 - chance, 1e-30)
     columns = np.concatenate([straight[:, None] / chance, weights], axis=1)
+    if (shares == shares[0]).all():
+        # what tells channels apart is nothing but the rounding of the bins
+        columns[:] = total[:, None]
+    columns *= (total / (chance * columns[:, 0] + (1 - chance) * columns[:, 1:].mean(axis=1)))[:, None]
     return np.concatenate([lower, width, columns.ravel(), [chance, collisions.max()], total])
 
 
