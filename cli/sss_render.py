@@ -20,8 +20,10 @@ from .command import ArgumentParser, complain, progress, run, unavailable, versi
 
 if TYPE_CHECKING:
     from renderer.job import Budget
-    from renderer.render import Renderer
-    from renderer.scene.description import Scene
+    from renderer.render import Renderer, Settings, Stages
+    from renderer.scene.description import Scene, SceneObject
+    from renderer.scene.holes import HoleReport
+    from renderer.shaders.selection import Measured, Plan
 
 PROGRAM = "sss-render"
 _SHARE = 0.9
@@ -62,7 +64,11 @@ def _render(argv: Sequence[str] | None) -> int:
     parser = _parser()
     options = parser.parse_args(arguments)
     _refuse(options)
+    if options.output is None and not options.explain_only:
+        parser.error("the following arguments are required: -o/--output (or --explain-only)")
     with limited_memory(options.max_memory or share_of_memory(_SHARE)):
+        if options.explain_only:
+            return _explain_only(options)
         return _picture(options, started) if options.export is None else _export(options, parser)
 
 
@@ -70,7 +76,7 @@ def _picture(options: Any, started: float) -> int:
     """Render and write."""
     from renderer.job import execute, guide_arrays, rare_event_warnings, report
     from renderer.output.image import check_writable
-    from renderer.render import Renderer, Settings, Stages
+    from renderer.render import Renderer, Stages
 
     check_writable(options.output)
     if options.preview is not None:
@@ -80,10 +86,10 @@ def _picture(options: Any, started: float) -> int:
     stages = Stages()
     with stages.stage("load"):
         scene = _scene(options)
-    settings = Settings(options.shader, options.hole_handling, options.quality, options.seed, options.threads)
-    budget = _budget(options, started)
-    planned = None if budget.last is None else budget.last - budget.first
-    renderer = Renderer(scene, settings, planned, stages)
+    settings, passes = _settings(options), _passes(options)
+    scene, measured = _piloted(options, scene, settings, stages)
+    renderer = Renderer(scene, settings, passes, stages, measured)
+    budget = _budget(options, started, renderer.plans)
     if not options.quiet:
         _explain(renderer)
     for plan in renderer.plans:
@@ -119,16 +125,22 @@ def _parser() -> ArgumentParser:
         epilog="sss-render merge PART... -o OUT puts parts of one render (npz) together.",
     )
     parser.add_argument("scene", type=Path, metavar="SCENE.toml|MESH", help="what to render")
-    parser.add_argument("-o", "--output", type=Path, required=True, metavar="OUT", help="picture: .png, .exr or .npz")
+    parser.add_argument("-o", "--output", type=Path, metavar="OUT", help="picture: .png, .exr or .npz")
+    parser.add_argument("--explain-only", action="store_true",
+                        help="say what would be done with each object, and why; render nothing")  # fmt: skip
     parser.add_argument("--shader", choices=("auto", "path", "plumb", "scalar"), default="auto",
                         help="one shader for all objects (default: by predicted error)")  # fmt: skip
-    parser.add_argument("--quality", type=_share, default=0.5, metavar="Q",
-                        help="0 cheapest to 1 reference, for --shader auto (default: 0.5)")  # fmt: skip
+    parser.add_argument("--quality", type=_share, metavar="Q",
+                        help="0 cheapest to 1 reference: decides the shaders (default: 0.5) and, if given without "
+                        "--passes or the like, the passes")  # fmt: skip
+    parser.add_argument("--pilot", action="store_true",
+                        help="measure the errors of shaders in small pictures first, and choose by them")  # fmt: skip
     amount = parser.add_mutually_exclusive_group()
     amount.add_argument("--passes", type=_positive_int, metavar="N", help="camera samples a pixel (default: 64)")
     amount.add_argument("--time", type=_positive, metavar="S", help="seconds from start to written file")
     amount.add_argument("--target-error", type=_positive, metavar="E",
-                        help="stop at this mean relative standard error")  # fmt: skip
+                        help="relative error: only shaders predicted within it, and passes until the mean relative "
+                        "standard error is (with --quality: only the latter)")  # fmt: skip
     amount.add_argument("--pass-range", type=_pass_range, metavar="A:B", help="passes A up to, not including, B")
     parser.add_argument("--adaptive", action="store_true",
                         help="more passes where there is more noise, without bias")  # fmt: skip
@@ -148,7 +160,7 @@ def _parser() -> ArgumentParser:
                         help="what happens where surface is missing (default: as the check says)")  # fmt: skip
     parser.add_argument("--resume", action="store_true", help="go on with an unfinished render")
     parser.add_argument("--aov", type=lambda text: text.split(","), default=[], metavar="LIST",
-                        help="further arrays for exr and npz: depth, normal")  # fmt: skip
+                        help="further arrays for exr and npz: depth, normal, predicted_error, shader_id")  # fmt: skip
     parser.add_argument("--export", choices=("mitsuba",), metavar="mitsuba",
                         help="only write the scene for Mitsuba 3: -o FILE.xml, and a folder beside it")  # fmt: skip
     parser.add_argument("--report", type=Path, metavar="FILE.json", help="what was done, and how long it took")
@@ -227,15 +239,102 @@ def _scene(options: Any) -> Scene:
     return stage_mesh(mesh, options.material, options.size or (500, 500), options.unit)
 
 
-def _budget(options: Any, started: float) -> Budget:
-    from renderer.job import DEFAULT_PASSES, Budget
+def _settings(options: Any) -> Settings:
+    from renderer.render import Settings
+    from renderer.shaders.selection import DEFAULT_QUALITY
+
+    quality = DEFAULT_QUALITY if options.quality is None else options.quality
+    target = options.target_error if options.quality is None else None
+    return Settings(options.shader, options.hole_handling, quality, options.seed, options.threads, target)
+
+
+def _passes(options: Any) -> int | None:
+    """As many as are asked for; None where seconds, an error or the quality decide."""
+    from renderer.job import DEFAULT_PASSES
+
+    if options.pass_range is not None:
+        first, last = options.pass_range
+        return last - first
+    if options.passes is not None:
+        return options.passes
+    decided = options.time, options.target_error, options.quality
+    return DEFAULT_PASSES if all(one is None for one in decided) else None
+
+
+def _budget(options: Any, started: float, plans: Sequence[Plan]) -> Budget:
+    from renderer.job import Budget
+    from renderer.shaders.selection import picture_passes
 
     if options.pass_range is not None:
         first, last = options.pass_range
         return Budget(first, last, started=started)
     if options.time is not None or options.target_error is not None:
         return Budget(0, None, options.time, options.target_error, options.adaptive, started)
-    return Budget(0, options.passes or DEFAULT_PASSES, adaptive=options.adaptive, started=started)
+    return Budget(0, _passes(options) or picture_passes(plans), adaptive=options.adaptive, started=started)
+
+
+def _piloted(
+    options: Any, scene: Scene, settings: Settings, stages: Stages
+) -> tuple[Scene, dict[str, Measured] | None]:
+    """The scene, checked where pilots were asked for, and what they measured."""
+    if not options.pilot:
+        return scene, None
+    from renderer.pilot import measure
+    from renderer.scene.admission import admit
+
+    with stages.stage("check"):
+        scene, _ = admit(scene)
+    with stages.stage("pilot"), progress(1.0, "measuring", options.quiet) as advance:
+        return scene, measure(scene, settings, lambda share: advance(share, "pilots"))
+
+
+def _explain_only(options: Any) -> int:
+    """Print, and report where asked for, what would be done with each object."""
+    from renderer.job import plan_report
+    from renderer.render import Stages, closed_for_light, planned
+    from renderer.shaders.selection import picture_passes
+
+    if options.report is not None:
+        _check_report(options.report)
+    stages = Stages()
+    with stages.stage("load"):
+        scene = _scene(options)
+    settings, passes = _settings(options), _passes(options)
+    scene, measured = _piloted(options, scene, settings, stages)
+    scene, sources, plans = planned(scene, settings, passes, stages, measured)
+    _, holes, plans = closed_for_light(scene, plans, stages)
+    passes = passes or picture_passes(plans)
+    if not options.quiet:
+        for thing, plan, hole in zip(scene.objects, plans, holes, strict=True):
+            _explain_at_length(thing, plan, hole, sources.get(plan.name, ""))
+        print(f"{passes} passes")
+    if options.report is not None:
+        _write_report(options.report, json.dumps(plan_report(scene, plans, holes, passes, version(), stages), indent=1))
+    return 0
+
+
+def _explain_at_length(thing: SceneObject, plan: Plan, hole: HoleReport, source: str) -> None:
+    """An object's verdict and all shaders it could have had."""
+    if plan.state is None:
+        print(f"{plan.name}: {plan.shader}, {plan.size_px:.4g} pixels across at distance {plan.distance:.4g}")
+        return
+    assert thing.closedness is not None and plan.mean_free_path_px is not None
+    loops = thing.closedness.boundary_loops
+    print(
+        f"{plan.name}: {plan.state}, {loops} boundary loop(s) ({source}); "
+        f"hole handling {plan.hole_handling}{_expected(hole)}\n"
+        f"  distance {plan.distance:.4g}, {plan.size_px:.4g} pixels across, mean free path "
+        f"{plan.mean_free_path_px:.3g} pixels"
+    )
+    if plan.candidates:
+        print(f"  {'shader':8}{'error':>9}{'at most':>9}{'passes':>8}{'seconds':>10}{'share':>7}")
+    for one in plan.candidates:
+        share = plan.shares.get(one.shader, 0.0)
+        print(
+            f"  {one.shader:8}{100 * one.predicted_error:>7.2g} %{100 * one.error_bound:>7.2g} %{one.passes:>8}"
+            f"{one.predicted_seconds:>10.2g}{100 * share:>5.3g} %"
+        )
+    print(f"  {plan.shader}: {plan.reason}")
 
 
 def _explain(renderer: Renderer) -> None:
@@ -246,13 +345,16 @@ def _explain(renderer: Renderer) -> None:
             continue
         closedness = thing.closedness
         assert closedness is not None
-        expected = "" if not hole.expected_error else f", {100 * hole.expected_error:.2g} % error expected of it"
         holes = f", {closedness.boundary_loops} boundary loop(s)" if closedness.boundary_loops else ""
         print(
             f"{plan.name}: {plan.state}{holes} ({renderer.sources[plan.name]}); "
-            f"hole handling {plan.hole_handling}{expected}; "
+            f"hole handling {plan.hole_handling}{_expected(hole)}; "
             f"shader {plan.shader} at distance {plan.distance:.4g}: {plan.reason}"
         )
+
+
+def _expected(hole: HoleReport) -> str:
+    return "" if not hole.expected_error else f", {100 * hole.expected_error:.2g} % error expected of it"
 
 
 def _check_report(path: Path) -> None:

@@ -20,9 +20,18 @@ from . import adaptive
 from .output import image, passes
 from .output.film import Film
 from .output.image import Picture
-from .render import Renderer
-from .scene.description import DirectionalLight, PointLight, RectangleLight, SceneObject, SphereLight, Translucent
+from .render import Renderer, Stages, planned_hash
+from .scene.description import (
+    DirectionalLight,
+    PointLight,
+    RectangleLight,
+    Scene,
+    SceneObject,
+    SphereLight,
+    Translucent,
+)
 from .scene.holes import HoleReport, in_mesh_units
+from .shaders.selection import Plan
 
 DEFAULT_PASSES = 64
 REFRESH_EVERY, REFRESH_SHARE = 1.0, 0.05
@@ -289,6 +298,7 @@ def report(
     film, tally, seconds = picture.film, renderer.tally, renderer.stages.seconds
     error = film.mean_relative_stderr()
     stages = {name: seconds.get(name, 0.0) for name in ("load", "check", "close", "build", "render", "write")}
+    stages |= {name: seconds[name] for name in ("pilot",) if name in seconds}
     rendered_now = max(renderer.added, 1)
     target = None if budget is None else budget.target_error
     return {
@@ -296,9 +306,8 @@ def report(
         "version": version,
         "scene_hash": film.scene_hash,
         "seed": film.seed,
-        "objects": [
-            {**asdict(plan), "holes": _holes(hole)} for plan, hole in zip(renderer.plans, renderer.holes, strict=True)
-        ],
+        "objects": plans_with_holes(renderer.plans, renderer.holes),
+        "built": built(renderer.stages),
         "passes": film.passes,
         "pass_ranges": [list(span) for span in film.ranges],
         "seconds": {"total": total, **stages, "frame": stages["render"] / rendered_now},
@@ -320,9 +329,34 @@ def report(
     }
 
 
-def _holes(hole: HoleReport) -> dict[str, Any]:
-    """Of the report on an object's holes, what its plan does not say."""
-    return {name: value for name, value in asdict(hole).items() if name not in ("handling", "reason")}
+def plans_with_holes(plans: list[Plan], holes: list[HoleReport]) -> list[dict[str, Any]]:
+    """For each object its plan, and of the report on its holes what the plan does not say."""
+    said = ("handling", "reason")
+    return [
+        {**asdict(plan), "holes": {name: value for name, value in asdict(hole).items() if name not in said}}
+        for plan, hole in zip(plans, holes, strict=True)
+    ]
+
+
+def built(stages: Stages) -> dict[str, Any]:
+    """Seconds that each thing built took: for the whole scene, and for objects by name. What is not there was not
+    needed."""
+    return {"scene": stages.parts.get("", {}), "objects": {k: v for k, v in stages.parts.items() if k}}
+
+
+def plan_report(
+    scene: Scene, plans: list[Plan], holes: list[HoleReport], passes: int, version: str, stages: Stages
+) -> dict[str, Any]:
+    """The JSON object of ``--report`` where nothing is rendered."""
+    return {
+        "schema": "sss-render/1",
+        "version": version,
+        "scene_hash": planned_hash(scene, plans),
+        "objects": plans_with_holes(plans, holes),
+        "passes": passes,
+        "explained_only": True,
+        "seconds": stages.seconds,
+    }
 
 
 def light_methods(renderer: Renderer) -> list[dict[str, str]]:
@@ -334,7 +368,7 @@ def light_methods(renderer: Renderer) -> list[dict[str, str]]:
         sampled.append("uneven skies")
     methods = []
     for thing, plan in zip(renderer.scene.objects, renderer.plans, strict=True):
-        if plan.shader != "path" or not isinstance(thing.material, Translucent):
+        if "path" not in plan.shares or not isinstance(thing.material, Translucent):
             continue
         if thing.material.medium.ior == 1:
             where = "at collisions"
@@ -392,9 +426,11 @@ def peak_memory() -> int | None:
 def guide_arrays(renderer: Renderer, names: list[str]) -> dict[str, NDArray]:
     """Arrays by name for ``--aov``, of the rays through the pixels' centres.
 
-    depth (h, w) float32, scene units along the ray, inf for none; normal (h, w, 3) float32, geometric, outward
+    depth (h, w) float32, scene units along the ray, inf for none; normal (h, w, 3) float32, geometric, outward;
+    predicted_error (h, w) float32, relative, of the object's shader, NaN where none is predicted; shader_id is in
+    every picture anyway
     """
-    known = {"depth", "normal"}
+    known = {"depth", "normal", "predicted_error", "shader_id"}
     for name in names:
         if name not in known:
             raise InputError(f"--aov {name}", "is no such array", f"choose from {', '.join(sorted(known))}")
@@ -406,8 +442,13 @@ def guide_arrays(renderer: Renderer, names: list[str]) -> dict[str, NDArray]:
     distance, triangle = traced.closest(np.repeat(camera.origin[:, None], directions.shape[1], axis=1), directions)
     depth = np.where(triangle >= 0, distance * np.float32(traced.frame.scale), np.float32(np.inf))
     normal = np.where(triangle >= 0, traced.triangle_normal[:, triangle], 0)
-    arrays = {"depth": depth.reshape(height, width), "normal": normal.T.reshape(height, width, 3)}
-    return {name: np.ascontiguousarray(arrays[name], np.float32) for name in names}
+    errors = [np.nan if plan.predicted_error is None else plan.predicted_error for plan in renderer.plans]
+    arrays = {
+        "depth": depth.reshape(height, width),
+        "normal": normal.T.reshape(height, width, 3),
+        "predicted_error": np.array([*errors, np.nan])[renderer.object_id],
+    }
+    return {name: np.ascontiguousarray(arrays[name], np.float32) for name in names if name in arrays}
 
 
 def merged(parts: list[Path]) -> Picture:

@@ -6,7 +6,7 @@ import os
 import threading
 import time
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
@@ -24,11 +24,12 @@ from .scene.admission import admit
 from .scene.camera import CameraRays
 from .scene.description import Camera, Scene
 from .scene.fingerprint import scene_hash
-from .scene.holes import close_holes
+from .scene.holes import HoleReport, close_holes
 from .shaders import FAST_SHADERS, diffuse, plumb, selection
 from .shaders.ambient_field import corner_field
+from .shaders.blend import Blend
 from .shaders.fast_body import FastBody
-from .shaders.selection import DEFAULT_QUALITY, Plan
+from .shaders.selection import DEFAULT_QUALITY, Measured, Plan
 from .shaders.surface import BodyOptics
 from .tracing.acceleration import Acceleration
 from .tracing.memory import keep_freed_memory
@@ -55,6 +56,7 @@ class Settings:
 
     shader, hole_handling  "auto", or one for all objects
     quality                in [0, 1], see ``selection``
+    target_error           relative error allowed, in place of what the quality allows
     seed                   of the random numbers
     threads                None: as many as there are cores
     """
@@ -64,13 +66,26 @@ class Settings:
     quality: float = DEFAULT_QUALITY
     seed: int = 0
     threads: int | None = None
+    target_error: float | None = None
 
 
 @dataclass
 class Stages:
-    """Wall seconds by stage."""
+    """Wall seconds by stage.
+
+    parts  of the stage ``build``: what was built for which object, or for the whole scene ("")
+    """
 
     seconds: dict[str, float] = field(default_factory=dict)
+    parts: dict[str, dict[str, float]] = field(default_factory=dict)
+
+    @contextmanager
+    def part(self, thing: str, what: str) -> Iterator[None]:
+        """Count the block's time as that of building ``what`` for the object ``thing``."""
+        start = time.perf_counter()
+        yield
+        mine = self.parts.setdefault(thing, {})
+        mine[what] = mine.get(what, 0.0) + time.perf_counter() - start
 
     @contextmanager
     def stage(self, name: str) -> Iterator[None]:
@@ -94,32 +109,35 @@ class Renderer:
     tally    counts over all passes of this renderer
     stages   seconds for check, build and render
 
+    passes    as many as there will be; None: what the tolerance asks for, which the plans then say
+    measured  by object name, what pilots found (see ``pilot``)
+
     Raises InputError for a camera inside an object.
     """
 
-    def __init__(self, scene: Scene, settings: Settings, passes: int | None = None, stages: Stages | None = None):
+    def __init__(
+        self,
+        scene: Scene,
+        settings: Settings,
+        passes: int | None = None,
+        stages: Stages | None = None,
+        measured: Mapping[str, Measured] | None = None,
+    ):
         self.settings, self.stages, self.tally = settings, stages or Stages(), Tally()
-        with self.stages.stage("check"):
-            checked, self.sources = admit(scene)
-        self.plans = selection.select(checked, settings.quality, settings.shader, settings.hole_handling, passes)
-        self.scene = checked
+        self.scene, self.sources, self.plans = planned(scene, settings, passes, self.stages, measured)
         keep_freed_memory()
-        shaders = [plan.shader for plan in self.plans]
-        with self.stages.stage("close"):
-            handling, reasons = zip(*((plan.hole_handling, plan.reason) for plan in self.plans), strict=True)
-            closed, self.holes = close_holes(self.scene, shaders, handling, reasons)
-        self.plans = [
-            replace(plan, hole_handling=hole.handling, reason=hole.reason)
-            for plan, hole in zip(self.plans, self.holes, strict=True)
-        ]
+        closed, self.holes, self.plans = closed_for_light(self.scene, self.plans, self.stages)
         with self.stages.stage("build"):
-            self.traced = TracedScene(closed, shaders, [plan.hole_handling for plan in self.plans])
+            with self.stages.part("", "triangles and beams of light"):
+                handling = [plan.hole_handling for plan in self.plans]
+                self.traced = TracedScene(closed, [_dearest(plan) for plan in self.plans], handling)
             self.camera = CameraRays(scene.camera, self.traced.frame)
             width, height = scene.camera.resolution
-            self._fast_bodies = _fast_bodies(self.traced, width * height, settings.threads or os.cpu_count() or 1)
-            self.acceleration = Acceleration.chosen(self.traced, width * height)
+            threads = settings.threads or os.cpu_count() or 1
+            self._fast_bodies, self._blends = _bodies(self.traced, self.plans, width * height, threads, self.stages)
+            self.acceleration = _acceleration(self.traced, width * height, self.stages)
             self._frames = None
-            if direct.applies_to(self.traced, self._fast_bodies):
+            if not self._blends and direct.applies_to(self.traced, self._fast_bodies):
                 self._frames = direct.Frames(self.traced, self.camera, self._fast_bodies, settings.seed)
             self.shader_id, self.object_id = self._identify()
         self.film = Film.blank(scene.camera.resolution, planned_hash(scene, self.plans), settings.seed)
@@ -202,7 +220,7 @@ class Renderer:
 
     def _passes_at_once(self, pace: _Pace, pixels: int, seconds_left: Callable[[], float] | None) -> int:
         """How many passes of so many pixels the next unit takes."""
-        if self._fast_bodies:
+        if self._fast_bodies or self._blends:
             return 1
         passes = pace.next_passes()
         if seconds_left is not None:
@@ -258,7 +276,12 @@ class Renderer:
         if self._frames is not None:
             return direct.DirectTracer(self._frames)
         return Wavefront(
-            self.traced, self.camera, self._fast_bodies, self.settings.seed, acceleration=self.acceleration
+            self.traced,
+            self.camera,
+            self._fast_bodies,
+            self.settings.seed,
+            acceleration=self.acceleration,
+            blends=self._blends,
         )
 
     def _add(self, units: list[Samples], k: int, index: int, chosen: NDArray[np.bool_] | None) -> None:
@@ -274,7 +297,8 @@ class Renderer:
             radiance[chosen], first[chosen] = here, there
         # -1, nothing, is the last entry
         translucent = np.array([*(thing.medium is not None for thing in self.traced.objects), False])
-        fast = np.array([*(thing.index in self._fast_bodies for thing in self.traced.objects), False])
+        biased = self._fast_bodies.keys() | self._blends.keys()
+        fast = np.array([*(thing.index in biased for thing in self.traced.objects), False])
         self.film.add_pass(index, radiance, translucent[first], fast[first], chosen)
         self.added += 1
         if k == 0:
@@ -332,38 +356,107 @@ def _consecutive(numbers: list[int]) -> Iterator[range]:
             start = k
 
 
+def planned(
+    scene: Scene,
+    settings: Settings,
+    passes: int | None = None,
+    stages: Stages | None = None,
+    measured: Mapping[str, Measured] | None = None,
+) -> tuple[Scene, dict[str, str], list[Plan]]:
+    """The checked scene, where each verdict comes from by object name, and what would be done; as in ``Renderer``."""
+    with (stages or Stages()).stage("check"):
+        checked, sources = admit(scene)
+    plans = selection.select(
+        checked,
+        settings.quality,
+        settings.shader,
+        settings.hole_handling,
+        passes,
+        target_error=settings.target_error,
+        measured=measured,
+        threads=settings.threads,
+    )
+    return checked, sources, plans
+
+
+def closed_for_light(
+    scene: Scene, plans: list[Plan], stages: Stages | None = None
+) -> tuple[Scene, list[HoleReport], list[Plan]]:
+    """The scene as rays shall meet it, what was done at holes, and the plans that say so (see ``scene.holes``)."""
+    with (stages or Stages()).stage("close"):
+        handling, reasons = zip(*((plan.hole_handling, plan.reason) for plan in plans), strict=True)
+        closed, holes = close_holes(scene, [_dearest(plan) for plan in plans], handling, reasons)
+    plans = [
+        replace(plan, hole_handling=hole.handling, reason=hole.reason) for plan, hole in zip(plans, holes, strict=True)
+    ]
+    return closed, holes, plans
+
+
+def _dearest(plan: Plan) -> str:
+    """Of an object's shaders the one that needs most to be known of it."""
+    return list(plan.shares)[-1] if plan.shares else plan.shader
+
+
 def planned_hash(scene: Scene, plans: list[Plan]) -> str:
     """Hexadecimal digest of the scene and of what is done with its objects: samples of two films with equal hash
     and seed may be added up."""
     digest = blake2b(digest_size=16)
     digest.update((scene.hash or scene_hash(scene)).encode())
     for plan in plans:
-        digest.update(f"|{plan.shader}|{plan.hole_handling}".encode())
+        shaders = plan.shader if len(plan.shares) < 2 else repr(plan.shares)
+        digest.update(f"|{shaders}|{plan.hole_handling}".encode())
     return digest.hexdigest()
 
 
-def _fast_bodies(traced: TracedScene, pixels: int, threads: int) -> dict[int, FastBody]:
-    """What the faster shaders need, for the objects that use them and no others."""
+def _acceleration(traced: TracedScene, pixels: int, stages: Stages) -> Acceleration:
+    start = time.perf_counter()
+    acceleration = Acceleration.chosen(traced, pixels)
+    if acceleration.grid is not None:
+        stages.parts.setdefault("", {})["distance grid and ball jumps"] = time.perf_counter() - start
+    return acceleration
+
+
+def _bodies(
+    traced: TracedScene, plans: list[Plan], pixels: int, threads: int, stages: Stages
+) -> tuple[dict[int, FastBody], dict[int, Blend]]:
+    """What the faster shaders need, for the objects that use them and no others; and those that use several."""
     even = any(environment.constant is not None for environment in traced.lights.environments)
     media = {thing.index: thing.medium for thing in traced.objects}
     bodies: dict[int, FastBody] = {}
-    for thing in traced.objects:
-        shader = FAST_SHADERS.get(thing.shader)
-        if shader is None or thing.medium is None:
+    blends: dict[int, Blend] = {}
+    for thing, plan in zip(traced.objects, plans, strict=True):
+        names = [name for name in plan.shares if name in FAST_SHADERS]
+        if not names or thing.medium is None:
             continue
         radius = float(np.linalg.norm(thing.upper - thing.lower)) / 2
         others = {index: medium for index, medium in media.items() if index != thing.index}
         optics = BodyOptics.prepare(thing.index, thing.medium, radius, others)
-        curvature = None
-        if shader is not diffuse:
-            curvature = _corner_curvature(traced, thing)
-            _ = optics.tables  # now, and not in every thread at once
-        field = None
+        curvature = field = None
+        if names != [diffuse.NAME]:
+            with stages.part(plan.name, "curvature"):
+                curvature = _corner_curvature(traced, thing)
+            with stages.part(plan.name, "table of balls"):
+                _ = optics.tables  # now, and not in every thread at once
         # else frames themselves are sooner done
-        if curvature is not None and shader is plumb and even and len(curvature) <= max(pixels, _FIELD_FACES):
-            field = _ambient_field(traced, thing, optics, curvature, threads)
-        bodies[thing.index] = FastBody(thing, shader, optics, curvature, field)
-    return bodies
+        if curvature is not None and plumb.NAME in names and even and len(curvature) <= max(pixels, _FIELD_FACES):
+            with stages.part(plan.name, "light of the sky at corners"):
+                field = _ambient_field(traced, thing, optics, curvature, threads)
+        made = {
+            name: FastBody(
+                thing,
+                FAST_SHADERS[name],
+                optics,
+                None if name == diffuse.NAME else curvature,
+                field if name == plumb.NAME else None,
+            )
+            for name in names
+        }
+        if len(plan.shares) == 1:
+            bodies[thing.index] = made[names[0]]
+        else:
+            lit = tuple(made.get(name) for name in plan.shares)
+            blends[thing.index] = Blend(thing.index, lit, tuple(plan.shares.values()))
+    return bodies, blends
 
 
 def _ambient_field(traced, thing: TracedObject, optics: BodyOptics, curvature, threads: int) -> NDArray[np.float32]:

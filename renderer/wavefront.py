@@ -18,6 +18,7 @@ from .optics.multiple_importance import power_heuristic
 from .scene.beams import beams
 from .scene.camera import CameraRays
 from .scene.lights import RectangleSource, SphereSource
+from .shaders.blend import Blend, Choices
 from .shaders.boundary import meet_boundary, split
 from .shaders.fast_body import FastBody
 from .shaders.opaque import meet_diffuse, meet_mirror
@@ -71,6 +72,7 @@ class Wavefront:
 
     fast_bodies   the objects that a shader other than path lights, by object index
     acceleration  what makes walks shorter or cheaper and leaves their mean alone
+    blends        the objects that several shaders light, by object index
 
     A path is in one of several places: flying outside, standing on a surface, or in one of the media. Each step
     takes all paths of the fullest place one event further.
@@ -84,6 +86,7 @@ class Wavefront:
         seed: int,
         block: int = BLOCK,
         acceleration: Acceleration | None = None,
+        blends: Mapping[int, Blend] | None = None,
     ):
         self.scene, self.camera, self.seed = scene, camera, seed
         block = max(block, 2)  # a path and its branch
@@ -94,7 +97,7 @@ class Wavefront:
         self._walks = [
             MediumWalk(scene, slot, block, self._uniforms, self._tally, chosen) for slot in range(scene.media.count)
         ]
-        self._fast_bodies = fast_bodies
+        self._fast_bodies, self._blends = fast_bodies, blends or {}
         # how each object answers a ray, for scenes with more than one kind of surface
         self._kind = [thing.shader for thing in scene.objects]
 
@@ -115,7 +118,8 @@ class Wavefront:
         Pass after pass, pixel after pixel. Fast bodies are lit by other beams in each pass: with them in the scene
         there must be one pass.
         """
-        if passes > 1 and self._fast_bodies:
+        beams_of_pass = bool(self._fast_bodies or self._blends)
+        if passes > 1 and beams_of_pass:
             raise ValueError("fast shaders take one pass at a time")
         self._first_pass, self._first_pixel, self._pixels = first_pass, first_pixel, last_pixel - first_pixel
         self._chosen = chosen
@@ -125,7 +129,8 @@ class Wavefront:
         self._samples = count
         self._first_object = np.full(count, NOTHING)
         self._first_unknown = np.ones(count, bool)
-        self._beams = beams(self.scene.lights, first_pass) if self._fast_bodies else []
+        self._beams = beams(self.scene.lights, first_pass) if beams_of_pass else []
+        self._choices = Choices(self._blends, self._streams(np.arange(count))) if self._blends else None
         for place in (self._flying, self._standing):
             place.clear()
         for walk in self._walks:
@@ -154,14 +159,18 @@ class Wavefront:
 
     def _emit(self, first_sample: int, count: int) -> None:
         samples = np.arange(first_sample, first_sample + count)
-        passes, pixels = np.divmod(samples, max(self._pixels, 1))
-        pixels += self._first_pixel
-        if self._chosen is not None:
-            pixels = self._chosen[pixels]
-        streams = stream_keys(self.seed, passes + self._first_pass, pixels)
+        streams = self._streams(samples)
         jitter = np.stack(self._uniforms.draw(streams))
-        direction = self.camera.directions(pixels, jitter)
+        direction = self.camera.directions(self._pixel(samples), jitter)
         self._flying.emit(self.camera.origin[:, None], direction, streams, samples)
+
+    def _pixel(self, samples: NDArray[np.int64]) -> NDArray[np.int64]:
+        pixels = samples % max(self._pixels, 1) + self._first_pixel
+        return pixels if self._chosen is None else self._chosen[pixels]
+
+    def _streams(self, samples: NDArray[np.int64]) -> NDArray[np.uint64]:
+        passes = samples // max(self._pixels, 1) + self._first_pass
+        return stream_keys(self.seed, passes, self._pixel(samples))
 
     def _step(self) -> None:
         """Take the paths of the fullest place one event further."""
@@ -205,7 +214,7 @@ class Wavefront:
     def _meet(self) -> None:
         """What each surface does to the paths that stand on it."""
         paths, scene = self._standing, self.scene
-        split(scene, paths, self._samples)
+        split(scene, paths, self._samples, self._choices)
         index, triangle = np.arange(paths.count), paths.triangle.copy()
         spheres = triangle < 0
         if spheres.any():
@@ -220,19 +229,32 @@ class Wavefront:
             who, faces = index[here], triangle[here]
             if not len(who):
                 continue
-            if kind == "path":
-                meet_boundary(scene, paths, who, faces, self._uniforms, self._tally, self._radiance)
-            elif kind == "opaque":
+            if kind == "opaque":
                 meet_diffuse(scene, paths, who, faces, self._uniforms, self._tally, self._radiance)
             elif kind == "mirror":
                 meet_mirror(scene, paths, who, faces)
+            elif k in self._blends:
+                assert self._choices is not None
+                chosen = self._choices.of(k, paths.sample[who])
+                for number, body in enumerate(self._blends[k].bodies):
+                    some = np.flatnonzero(chosen == number)
+                    self._meet_body(body, who[some], faces[some])
             else:
-                self._fast_bodies[k].meet(
-                    scene, paths, who, faces, self._beams, self._uniforms, self._tally, self._radiance
-                )
+                self._meet_body(self._fast_bodies.get(k), who, faces)
         if scene.lights.rectangles:
             here = np.flatnonzero(thing < 0)
             self._meet_rectangles(index[here], triangle[here])
+
+    def _meet_body(self, body: FastBody | None, who: NDArray[np.intp], faces: NDArray[np.int32]) -> None:
+        """What a translucent object does to paths that meet it, lit by path where ``body`` is None."""
+        if not len(who):
+            return
+        arguments = (self.scene, self._standing, who, faces)
+        counts = (self._uniforms, self._tally, self._radiance)
+        if body is None:
+            meet_boundary(*arguments, *counts)
+        else:
+            body.meet(*arguments, self._beams, *counts)
 
     def _note_first(self, index: NDArray[np.intp], thing: NDArray[np.int16]) -> None:
         # of a split path one branch is enough

@@ -24,6 +24,10 @@ def admit(scene: Scene) -> tuple[Scene, dict[str, str]]:
     for thing in scene.objects:
         if isinstance(thing.material, Translucent):
             _refuse_camera_inside(scene, thing)
+            if thing.closedness is not None:
+                sources[thing.name] = "checked before"
+                objects.append(thing)
+                continue
             key = id(thing.source if thing.source is not None else thing.mesh)
             if key not in verdicts:
                 verdicts[key] = _verdict(thing)

@@ -11,6 +11,7 @@ from ..tracing.paths import CHANCE, OUTSIDE, REFLECTS, REFRACTS, WHOLE, Paths
 from ..tracing.streams import Uniforms, branch_streams
 from ..tracing.tally import Tally
 from ..tracing.traced_scene import TracedScene, offset_from
+from .blend import Choices
 from .crossings import Crossings
 from .local_frame import LocalFrame
 from .lost_paths import lose
@@ -19,7 +20,7 @@ from .point_light import light_rough, turned_density
 Float32 = NDArray[np.float32]
 
 
-def split(scene: TracedScene, paths: Paths, samples: int) -> None:
+def split(scene: TracedScene, paths: Paths, samples: int, choices: Choices | None = None) -> None:
     """Split the whole paths that are about to enter a body: each will refract, a copy of it reflect.
 
     What the first boundary reflects and what comes from inside are so different that leaving the choice to chance is
@@ -32,6 +33,8 @@ def split(scene: TracedScene, paths: Paths, samples: int) -> None:
     entering = np.einsum("ij,ij->j", paths.direction[:, whole], scene.triangle_normal[:, triangle]) < 0
     bends = (slot >= 0) & (scene.media.ior[slot] != 1) & (paths.inside[slot, whole] == 0)
     whole = whole[bends & entering]
+    if choices is not None:
+        whole = whole[~choices.stay_outside(scene.triangle_object[paths.triangle[whole]], paths.sample[whole])]
     if len(whole):
         paths.branch[whole] = REFRACTS
         copies = paths.append(paths, whole)

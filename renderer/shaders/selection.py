@@ -6,43 +6,67 @@ Funkhouser & Sequin 1993, SIGGRAPH):
     e0 = 0.3 * 10^(-2 q),    e = e0 (1 + 64 / n)
 
 so that what is small in the picture may be rougher, and objects fall from path through plumb and scalar to the
-diffuse fallback as they recede. The predicted errors are shares of the object's radiance, measured on balls and
-ellipsoids; their coefficients beyond those are judgements.
+diffuse fallback as they recede. A shader with error b is good enough up to n = 64 / (b / e0 - 1). Within ``FADE`` of
+that size its samples turn into the next one's, camera sample by camera sample, so that nothing pops and no frame needs
+to know the one before. The errors are those of ``prediction``, or measured by pilots.
+
+Where the number of passes is not given it follows as well: as many as path needs for its noise to be within e.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+import math
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from sss_tools.medium import Medium
-
-from ..scene.description import (
-    Camera,
-    DirectionalLight,
-    EnvironmentLight,
-    Light,
-    PointLight,
-    RectangleLight,
-    Scene,
-    SceneObject,
-    SphereLight,
-    Translucent,
-)
+from ..scene.description import Scene, SceneObject, Translucent
+from .appearance import Appearance, appearance, pixel_footprint
+from .cost import predicted_seconds
+from .prediction import FAST_NOISE, Error, predicted_errors, predicted_noise
 
 DEFAULT_QUALITY = 0.5
 CHEAPEST_FIRST = ("diffuse", "scalar", "plumb", "path")
+FADE = 0.15
+"""Relative distance from a threshold, in sizes or errors, within which both shaders have samples."""
+MOST_PASSES = 16384
+"""Passes are 1 / (e^2 / noise^2 + 1 / this): never as many, and yet more for every higher quality."""
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A shader that an object could have.
+
+    predicted_error    of its light; of path, the noise after ``passes``
+    error_bound        what that exceeds in one case of twenty
+    passes             those given, or as many as its noise needs to be within the tolerance
+    predicted_seconds  wall seconds that the object's samples take in these passes, without set-up
+    measured           whether a pilot measured the error
+    """
+
+    shader: str
+    predicted_error: float
+    error_bound: float
+    passes: int
+    predicted_seconds: float
+    measured: bool = False
 
 
 @dataclass(frozen=True)
 class Plan:
     """What is done with one object, and why.
 
+    shader              that of most of its camera samples
     distance            of the camera from the box around the object, scene units
     mean_free_path_px   in pixels at that distance, mean of the channels; None for opaque objects
     size_px             diameter of the object in pixels
     predicted_error     relative, of the chosen shader; None where nothing is predicted
+    tolerance           relative error allowed; None for opaque objects
+    shares              of its camera samples that each shader lights: one, or several near a threshold
+    passes              that its chosen shaders need, or those given
+    candidates          cheapest first; none for opaque objects and those without an inside
     """
 
     name: str
@@ -55,28 +79,52 @@ class Plan:
     size_px: float
     predicted_error: float | None
     warning: str | None = None
+    tolerance: float | None = None
+    shares: dict[str, float] = field(default_factory=dict)
+    passes: int = 1
+    candidates: tuple[Candidate, ...] = ()
 
 
 @dataclass(frozen=True)
-class Appearance:
-    """How an object stands in the picture and what its medium makes of its shape.
+class Measured:
+    """What a pilot found of an object: the error of each shader but path, and the noise of path's samples."""
 
-    distance   scene units
-    footprint  side of a pixel at the object, scene units
-    size_px    diameter in pixels
-    depth      tau, inradius in transport mean free paths
-    diffusion  diffusion length, scene units
-    aspect     longest over shortest extent
-    unlit      share of the visible surface that the lights leave unlit
-    """
+    errors: Mapping[str, Error]
+    noise: Error
 
-    distance: float
-    footprint: float
-    size_px: float
-    depth: float
-    diffusion: float
-    aspect: float
-    unlit: float
+
+@dataclass(frozen=True)
+class Demand:
+    """How right the user wants it: by quality, or where ``target_error`` is given by that."""
+
+    quality: float = DEFAULT_QUALITY
+    target_error: float | None = None
+
+    def tolerance(self, size_px: float) -> float:
+        """The relative error allowed for an object ``size_px`` pixels across."""
+        return tolerance(self.quality, size_px) if self.target_error is None else self.target_error
+
+    def share(self, error: float, size_px: float, fade: bool = True) -> float:
+        """Share of the camera samples for which a shader so far off is good enough.
+
+        1 while the object is small or the shader right, 0 beyond, and a smooth step between (with ``fade``): around
+        the threshold in sizes, and just below it where it is an error that must not be exceeded.
+        """
+        if self.target_error is None:
+            allowed = tolerance(self.quality, math.inf)
+            beyond = max(size_px, 1e-3) * (error / allowed - 1) / 64
+        else:
+            beyond = error / self.target_error * (1 + FADE if fade else 1)
+        if not fade:
+            return float(beyond <= 1)
+        t = min(max((beyond - 1 + FADE) / (2 * FADE), 0.0), 1.0)
+        return 1 - t * t * (3 - 2 * t)
+
+    def __str__(self) -> str:
+        """As it is said in reasons."""
+        if self.target_error is not None:
+            return f"target error {100 * self.target_error:.2g} %"
+        return f"quality {self.quality:g}"
 
 
 def tolerance(quality: float, size_px: float) -> float:
@@ -84,18 +132,14 @@ def tolerance(quality: float, size_px: float) -> float:
     return 0.3 * 10 ** (-2 * quality) * (1 + 64 / max(size_px, 1e-3))
 
 
-def predicted_errors(look: Appearance) -> dict[str, float]:
-    """Relative error of each shader but path, by name."""
-    tau = max(look.depth, 1e-3)
-    ball = float(np.interp(np.log(tau), np.log([0.5, 1, 2, 5]), [0.07, 0.045, 0.03, 0.014]))
-    shape = next(error for limit, error in ((1.1, 0.03), (2, 0.15), (4, 0.25), (np.inf, 0.6)) if look.aspect <= limit)
-    plumb = float(np.hypot(ball, shape))
-    blur = min(1.0, 2 * look.diffusion / look.footprint)
-    return {
-        "diffuse": float(np.hypot(min(0.6, 1.6 * tau**-1.35) * blur, shape)) + 0.01,
-        "scalar": float(np.hypot(plumb, 0.3 * look.unlit)),
-        "plumb": plumb,
-    }
+def passes_within(noise: float, allowed: float) -> int:
+    """Camera samples a pixel after which their mean is noisy by ``allowed``, see ``MOST_PASSES``."""
+    return math.ceil(1 / ((allowed / max(noise, 1e-6)) ** 2 + 1 / MOST_PASSES) - 1e-9)
+
+
+def picture_passes(plans: Sequence[Plan]) -> int:
+    """As many as the most demanding object needs."""
+    return max((plan.passes for plan in plans), default=1)
 
 
 def select(
@@ -104,47 +148,127 @@ def select(
     shader: str = "auto",
     hole_handling: str = "auto",
     passes: int | None = None,
+    *,
+    target_error: float | None = None,
+    measured: Mapping[str, Measured] | None = None,
+    threads: int | None = None,
 ) -> list[Plan]:
     """A plan for each object of a scene whose translucent objects carry their closedness.
 
     shader, hole_handling  "auto" or what the user asks for, for all objects; the scene's own wishes come second
-    passes                 of the path shader, for its predicted noise; None where it is not known beforehand
+    passes                 of the picture; None: as many as the tolerance asks for
+    target_error           the tolerance of all objects, in place of that of ``quality``
+    measured               by object name, what pilots found; it replaces the prediction
+    threads                for the predicted seconds; None: as many as there are cores
     """
-    return [_plan(scene, thing, quality, shader, hole_handling, passes) for thing in scene.objects]
-
-
-def _plan(scene: Scene, thing: SceneObject, quality: float, shader: str, wish: str, passes: int | None) -> Plan:
-    look = appearance(scene, thing)
-    if not isinstance(thing.material, Translucent):
-        kind = "opaque" if type(thing.material).__name__ == "Diffuse" else "mirror"
-        return Plan(thing.name, None, "surface", kind, "opaque", look.distance, None, look.size_px, None)
-    assert thing.closedness is not None, "check the scene's objects first"
-    state = thing.closedness.state
-    handling, because = _handling(thing, wish)
-    wanted = thing.shader if shader == "auto" else shader
-    warning = None
-    errors = predicted_errors(look)
-    errors["path"] = 0.0 if passes is None else passes**-0.5
-    allowed = tolerance(quality, look.size_px)
-    if handling == "surface":
-        chosen, reason = "diffuse", "the mesh encloses no volume, so there is no inside for light"
-        if wanted != "auto":
-            warning = f"{thing.name}: {wanted} needs an inside, and this mesh has none; the diffuse fallback is used"
-    elif wanted != "auto":
-        chosen, reason = wanted, "asked for"
-    else:
-        chosen = _cheapest(errors, allowed)
-        reason = _reason(chosen, errors, allowed, look.size_px, quality)
-    mean_free_path = float(np.mean(thing.material.medium.mean_free_path)) / look.footprint
-    error = None if (chosen == "path" and passes is None) or handling == "surface" else errors[chosen]
-    reason = f"{reason}; {because}"
-    return Plan(
-        thing.name, state, handling, chosen, reason, look.distance, mean_free_path, look.size_px, error, warning
+    chooser = _Chooser(
+        scene,
+        Demand(quality, target_error),
+        shader,
+        hole_handling,
+        passes,
+        measured or {},
+        threads or os.cpu_count() or 1,
     )
+    return [chooser.plan(thing) for thing in scene.objects]
 
 
-def _cheapest(errors: dict[str, float], allowed: float) -> str:
-    return next(name for name in CHEAPEST_FIRST if name == "path" or errors[name] <= allowed)
+@dataclass(frozen=True)
+class _Chooser:
+    """``select``, object by object."""
+
+    scene: Scene
+    demand: Demand
+    shader: str
+    hole_handling: str
+    passes: int | None
+    measured: Mapping[str, Measured]
+    threads: int
+
+    def plan(self, thing: SceneObject) -> Plan:
+        look = appearance(self.scene, thing)
+        allowed = self.demand.tolerance(look.size_px)
+        fast_passes = self.passes or passes_within(FAST_NOISE, allowed)
+        if not isinstance(thing.material, Translucent):
+            kind = "opaque" if type(thing.material).__name__ == "Diffuse" else "mirror"
+            return Plan(thing.name, None, "surface", kind, "opaque", look.distance, None, look.size_px, None,
+                        passes=fast_passes)  # fmt: skip
+        assert thing.closedness is not None, "check the scene's objects first"
+        handling, because = _handling(thing, self.hole_handling)
+        wanted = thing.shader if self.shader == "auto" else self.shader
+        warning, error, passes = None, None, fast_passes
+        candidates = () if handling == "surface" else self._candidates(thing, look, allowed)
+        if handling == "surface":
+            shares, reason = {"diffuse": 1.0}, "the mesh encloses no volume, so there is no inside for light"
+            if wanted != "auto":
+                warning = (
+                    f"{thing.name}: {wanted} needs an inside, and this mesh has none; the diffuse fallback is used"
+                )
+        elif wanted != "auto":
+            shares, reason = {wanted: 1.0}, "asked for"
+        else:
+            shares = _shares({one.shader: one.error_bound for one in candidates}, self.demand, look.size_px, thing)
+            reason = self._reason(shares, candidates, allowed, look.size_px)
+        if candidates:
+            chosen = [(shares[one.shader], one) for one in candidates if one.shader in shares]
+            error = sum(share * one.predicted_error for share, one in chosen)
+            passes = math.ceil(sum(share * one.passes for share, one in chosen) - 1e-9)
+        return Plan(
+            name=thing.name,
+            state=thing.closedness.state,
+            hole_handling=handling,
+            shader=max(shares, key=shares.__getitem__),
+            reason=f"{reason}; {because}",
+            distance=look.distance,
+            mean_free_path_px=float(np.mean(thing.material.medium.mean_free_path)) / look.footprint,
+            size_px=look.size_px,
+            predicted_error=error,
+            warning=warning,
+            tolerance=allowed,
+            shares=shares,
+            passes=passes,
+            candidates=candidates,
+        )
+
+    def _candidates(self, thing: SceneObject, look: Appearance, allowed: float) -> tuple[Candidate, ...]:
+        found = self.measured.get(thing.name)
+        errors = found.errors if found else predicted_errors(look)
+        noise = found.noise if found else predicted_noise(look)
+        candidates = []
+        for name in CHEAPEST_FIRST:
+            passes = self.passes or passes_within(noise.bound if name == "path" else FAST_NOISE, allowed)
+            error = errors.get(name) or Error(noise.error * passes**-0.5, noise.bound * passes**-0.5)
+            seconds = predicted_seconds(name, thing, look, passes, self.threads)
+            candidates.append(Candidate(name, error.error, error.bound, passes, seconds, found is not None))
+        return tuple(candidates)
+
+    def _reason(self, shares: dict[str, float], candidates: tuple[Candidate, ...], allowed: float, size_px: float):
+        by_name = {one.shader: one for one in candidates}
+        where = f"tolerance {100 * allowed:.2g} % at {size_px:.3g} pixels and {self.demand}"
+        how = "measured by a pilot to be" if candidates[0].measured else "predicted"
+        chosen = max(shares, key=shares.__getitem__)
+        if len(shares) > 1:
+            mixture = ", ".join(f"{100 * share:.2g} % of the samples by {name}" for name, share in shares.items())
+            where = f"near a threshold: {mixture}; {where}"
+        if chosen == "path":
+            best = min(candidates[:-1], key=lambda one: one.error_bound)
+            return f"the best faster shader, {best.shader}, is {how} {_percent(best)} wrong; {where}"
+        right = "measured" if candidates[0].measured else "predicted"
+        return f"the cheapest {right} right enough: {_percent(by_name[chosen])} wrong; {where}"
+
+
+def _shares(bounds: Mapping[str, float], demand: Demand, size_px: float, thing: SceneObject) -> dict[str, float]:
+    """Of the camera samples, by shader: one with the uniform u takes the cheapest that is good enough for more than u
+    of them."""
+    # shadow rays pass a body of index 1 that path lights, and end at others: it must be one or the other
+    fade = isinstance(thing.material, Translucent) and thing.material.medium.ior != 1
+    shares, taken = {}, 0.0
+    for name in CHEAPEST_FIRST:
+        enough = 1.0 if name == "path" else demand.share(bounds[name], size_px, fade)
+        if enough > taken:
+            shares[name] = enough - taken
+            taken = enough
+    return shares
 
 
 def thresholds(scene: Scene, thing: SceneObject, quality: float = DEFAULT_QUALITY) -> list[tuple[float, str, str]]:
@@ -153,17 +277,23 @@ def thresholds(scene: Scene, thing: SceneObject, quality: float = DEFAULT_QUALIT
     Each is (distance in scene units, shader nearer than that, shader farther), as if the camera moved along its line
     to the object, and to 1 %; looked for from a tenth of the object's size to 10 000 times.
     """
-    look, camera = appearance(scene, thing), scene.camera
-    size = _diameter(thing)
+    look, camera, size = appearance(scene, thing), scene.camera, thing.mesh.longest_side
     distances = size * 10 ** np.arange(-1, 4, np.log10(1.01))
     chosen = []
     for distance in distances:
         footprint = pixel_footprint(camera, float(distance))
         there = replace(look, footprint=footprint, size_px=size / footprint)
-        chosen.append(_cheapest(predicted_errors(there), tolerance(quality, there.size_px)))
+        bounds = {name: error.bound for name, error in predicted_errors(there).items()}
+        shares = _shares(bounds, Demand(quality), there.size_px, thing)
+        chosen.append(max(shares, key=shares.__getitem__))
     return [
         (float(distances[k]), chosen[k - 1], chosen[k]) for k in range(1, len(chosen)) if chosen[k] != chosen[k - 1]
     ]
+
+
+def _percent(one: Candidate) -> str:
+    text = f"{100 * one.predicted_error:.2g} %"
+    return text if one.error_bound == one.predicted_error else f"{text} (hardly above {100 * one.error_bound:.2g} %)"
 
 
 def _handling(thing: SceneObject, wish: str) -> tuple[str, str]:
@@ -183,109 +313,3 @@ def _handling(thing: SceneObject, wish: str) -> tuple[str, str]:
         "surface": "open",
     }
     return recorded, because[recorded]
-
-
-def _reason(chosen: str, errors: dict[str, float], allowed: float, size_px: float, quality: float) -> str:
-    where = f"tolerance {100 * allowed:.2g} % at {size_px:.3g} pixels and quality {quality:g}"
-    if chosen == "path":
-        best = min(("plumb", "scalar", "diffuse"), key=errors.__getitem__)
-        return f"the best faster shader, {best}, is predicted {100 * errors[best]:.2g} % wrong; {where}"
-    return f"the cheapest predicted right enough: {100 * errors[chosen]:.2g} % wrong; {where}"
-
-
-def appearance(scene: Scene, thing: SceneObject) -> Appearance:
-    """How ``thing`` stands in the picture."""
-    camera, mesh = scene.camera, thing.mesh
-    lower, upper = mesh.bounds
-    position = np.asarray(camera.position, float)
-    nearest = np.clip(position, lower, upper)
-    distance = float(np.linalg.norm(position - nearest))
-    centre = mesh.bounds.mean(axis=0)
-    footprint = pixel_footprint(camera, max(distance, 1e-6 * mesh.diagonal))
-    depth, diffusion = 0.0, 0.0
-    if isinstance(thing.material, Translucent):
-        depth, diffusion = _optical_size(thing.material.medium, _inradius(thing))
-    return Appearance(
-        distance=distance,
-        footprint=footprint,
-        size_px=_diameter(thing) / pixel_footprint(camera, max(float(np.linalg.norm(position - centre)), footprint)),
-        depth=depth,
-        diffusion=diffusion,
-        aspect=_aspect(thing),
-        unlit=_unlit_share(scene.lights, centre, position),
-    )
-
-
-def pixel_footprint(camera: Camera, distance: float) -> float:
-    """Side of the square that a pixel covers at ``distance``, in its unit."""
-    return 2 * distance * float(np.tan(np.radians(camera.fov) / 2)) / camera.resolution[1]
-
-
-def _diameter(thing: SceneObject) -> float:
-    """The longest side of the bounding box: what the eye takes for an object's size."""
-    return thing.mesh.longest_side
-
-
-def _inradius(thing: SceneObject) -> float:
-    """3 V / A, the radius of the ball with this ratio of volume to area."""
-    return 3 * abs(thing.mesh.volume) / thing.mesh.area if thing.mesh.area > 0 else 0.0
-
-
-def _aspect(thing: SceneObject) -> float:
-    """Longest over shortest extent along the principal axes of the surface."""
-    mesh = thing.mesh
-    centres = mesh.vertices[mesh.faces].mean(axis=1)
-    weights = mesh.face_areas
-    if weights.sum() == 0:
-        return 1.0
-    offset = centres - np.average(centres, axis=0, weights=weights)
-    variances = np.maximum(np.linalg.eigvalsh((offset.T * weights) @ offset), 0)
-    if variances[-1] == 0:
-        return 1.0  # a single face
-    return float(np.sqrt(variances[-1] / max(variances[0], 1e-12 * variances[-1])))
-
-
-def _optical_size(medium: Medium, inradius: float) -> tuple[float, float]:
-    """Inradius in transport mean free paths, and the diffusion length in the medium's unit; means of the channels."""
-    extinction = np.asarray(medium.reduced_extinction, float)
-    diffusion = (2 * medium.sigma_a + medium.reduced_scattering) / (3 * np.maximum(extinction, 1e-30) ** 2)
-    # without absorption the body itself bounds how far light spreads
-    length = np.sqrt(diffusion / np.maximum(medium.sigma_a, diffusion / max(inradius, 1e-30) ** 2))
-    return inradius * float(extinction.mean()), float(length.mean())
-
-
-def _unlit_share(lights: tuple[Light, ...], centre, viewer) -> float:
-    """Share of a ball's visible disk that faces away from the lights, each weighted by its irradiance.
-
-    Seen from V a ball lit from L shows (1 - cos(V, L))/2 of its disk unlit; environments leave nothing unlit.
-    """
-    shares, weights = [], []
-    view = (viewer - centre) / max(float(np.linalg.norm(viewer - centre)), 1e-30)
-    for light in lights:
-        if isinstance(light, EnvironmentLight):
-            seen = light.radiance if light.image is None else light.image
-            shares.append(0.0)
-            weights.append(np.pi * float(np.mean(seen)) if seen is not None else 0.0)
-            continue
-        offset, irradiance = _from_light(light, centre)
-        shares.append((1 - float(offset @ view)) / 2)
-        weights.append(irradiance)
-    total = sum(weights)
-    return float(np.dot(shares, weights) / total) if total > 0 else 0.0
-
-
-def _from_light(
-    light: PointLight | DirectionalLight | RectangleLight | SphereLight, centre
-) -> tuple[np.ndarray, float]:
-    """Unit direction to a light from ``centre``, and its mean irradiance there."""
-    if isinstance(light, PointLight):
-        offset, strength = light.position - centre, float(np.mean(light.intensity))
-    elif isinstance(light, RectangleLight):
-        offset, strength = light.center - centre, 4 * light.half[0] * light.half[1] * float(np.mean(light.radiance))
-    elif isinstance(light, SphereLight):
-        offset, strength = light.center - centre, np.pi * light.radius**2 * float(np.mean(light.radiance))
-    else:
-        direction = -np.asarray(light.direction, float)
-        return direction / np.linalg.norm(direction), float(np.mean(light.irradiance))
-    distance = max(float(np.linalg.norm(offset)), 1e-30)
-    return offset / distance, strength / distance**2

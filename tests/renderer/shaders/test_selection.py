@@ -1,18 +1,24 @@
 """Which shader for which object."""
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
 
 from renderer.scene.admission import admit
 from renderer.scene.description import DirectionalLight, PointLight, RectangleLight, SphereLight
+from renderer.shaders import prediction
+from renderer.shaders.appearance import Appearance, appearance, pixel_footprint
+from renderer.shaders.prediction import Error, predicted_errors, starts
 from renderer.shaders.selection import (
     CHEAPEST_FIRST,
-    Appearance,
-    appearance,
-    pixel_footprint,
-    predicted_errors,
+    FADE,
+    MOST_PASSES,
+    Demand,
+    Measured,
+    passes_within,
+    picture_passes,
     select,
     tolerance,
 )
@@ -44,11 +50,11 @@ def test_the_tolerance_is_the_formula():
     assert np.isfinite(tolerance(0.5, 0))
 
 
-def test_farther_is_never_dearer_and_all_four_are_used():
+def test_farther_is_never_dearer_and_most_shaders_are_used():
     distances = np.geomspace(3, 5000, 60)
     ranks = [rank(chosen(ball_at(distance), 0.7)) for distance in distances]
     assert ranks == sorted(ranks, reverse=True)
-    assert set(ranks) == {0, 1, 2, 3}
+    assert set(ranks) >= {0, 3} and len(set(ranks)) >= 3
 
 
 @pytest.mark.parametrize("distance", [3, 10, 40, 150, 1000])
@@ -67,41 +73,175 @@ def test_the_choice_is_the_cheapest_within_the_tolerance():
     for distance in np.geomspace(3, 5000, 25):
         of = ball_at(distance)
         (plan,) = select(of, 0.7)
+        if len(plan.shares) > 1:
+            continue  # near a threshold
         look = appearance(of, of.objects[0])
         errors, allowed = predicted_errors(look), tolerance(0.7, look.size_px)
-        good = [name for name in CHEAPEST_FIRST[:-1] if errors[name] <= allowed]
+        good = [name for name in CHEAPEST_FIRST[:-1] if errors[name].bound <= allowed]
         assert plan.shader == (good[0] if good else "path")
         if good:
-            assert plan.predicted_error == errors[plan.shader]
+            assert plan.predicted_error == errors[plan.shader].error
 
 
 def test_the_reason_names_shader_error_tolerance_and_holes():
-    (plan,) = select(ball_at(40), 0.7)
-    assert plan.shader in ("plumb", "scalar")
-    for part in ("% wrong", "tolerance", "quality 0.7", "closed, manifold and oriented"):
+    (plan,) = select(ball_at(40), 0.3)
+    assert plan.shader != "path"
+    for part in ("wrong", "tolerance", "quality 0.3", "closed, manifold and oriented"):
         assert part in plan.reason
     (near,) = select(ball_at(3), 0.9)
-    assert near.reason.startswith("the best faster shader, plumb, is predicted")
+    assert near.reason.startswith("the best faster shader, ")
 
 
-def test_predicted_errors_of_a_ball_are_the_measured_ones():
+def test_the_starts_of_the_prediction_of_a_ball_are_the_measured_errors():
     look = Appearance(5, 0.01, 200, depth=2.0, diffusion=1.0, aspect=1.0, unlit=0.5)
-    errors = predicted_errors(look)
+    errors = starts(look)
     assert errors["plumb"] == pytest.approx(np.hypot(0.03, 0.03))
     assert errors["scalar"] == pytest.approx(np.hypot(errors["plumb"], 0.15))
     assert errors["diffuse"] == pytest.approx(np.hypot(0.6, 0.03) + 0.01)
     # what is blurred within a pixel does not show
-    assert predicted_errors(replace(look, footprint=100.0))["diffuse"] == pytest.approx(
-        np.hypot(0.6 * 0.02, 0.03) + 0.01
-    )
+    assert starts(replace(look, footprint=100.0))["diffuse"] == pytest.approx(np.hypot(0.6 * 0.02, 0.03) + 0.01)
     # long and flat bodies are worse, and what is lit from the camera hides the scalar's weakness
-    assert predicted_errors(replace(look, aspect=3.0))["plumb"] > 0.2
-    assert predicted_errors(replace(look, unlit=0.0))["scalar"] == errors["plumb"]
+    assert starts(replace(look, aspect=3.0))["plumb"] > 0.2
+    assert starts(replace(look, unlit=0.0))["scalar"] == errors["plumb"]
 
 
-def test_the_noise_of_path_is_predicted_where_the_passes_are_known():
-    assert select(ball_at(3), shader="path", passes=100)[0].predicted_error == pytest.approx(0.1)
-    assert select(ball_at(3), shader="path")[0].predicted_error is None
+def test_the_fit_multiplies_the_start_and_the_margin_the_error(monkeypatch):
+    look = Appearance(5, 0.01, 200, depth=np.e, diffusion=1.0, aspect=1.0, unlit=0.5)
+    # one: ln 2; depth: ln 3, at a depth of e
+    fit = prediction.Fit((np.log(2), np.log(3), 0, 0, 0, 0, 0, 0, 0), 0.3, 1.5)
+    monkeypatch.setattr(prediction, "fits", lambda: dict.fromkeys(("plumb", "scalar", "diffuse", "noise"), fit))
+    found = predicted_errors(look)
+    assert found["plumb"].error == pytest.approx(6 * starts(look)["plumb"])
+    assert found["plumb"].bound == pytest.approx(1.5 * found["plumb"].error)
+
+
+def test_every_feature_is_bounded_however_odd_the_object():
+    odd = Appearance(0, 0, 0, depth=0, diffusion=0, aspect=1e9, unlit=1, absorbed=0, roundness=0)
+    assert np.isfinite(prediction.features(odd)).all()
+    assert len(prediction.features(odd)) == len(prediction.FEATURES)
+
+
+def test_the_noise_of_path_is_predicted_for_the_passes_there_will_be():
+    of = ball_at(3)
+    noise = prediction.predicted_noise(appearance(of, of.objects[0])).error
+    assert select(of, shader="path", passes=100)[0].predicted_error == pytest.approx(noise / 10)
+    (plan,) = select(of, 0.2, shader="path")
+    assert plan.predicted_error == pytest.approx(noise / plan.passes**0.5)
+    # the cap on passes takes half a percent of these few
+    assert plan.predicted_error <= 1.01 * plan.tolerance
+
+
+# ---- passes from the quality ----
+
+
+def test_passes_are_those_that_the_noise_needs_and_saturate():
+    # 1 / (0.1 / 1.7)^2 = 289, less two percent for the cap
+    assert passes_within(1.7, 0.1) == pytest.approx(289, rel=0.02)
+    assert passes_within(1.7, 10) == 1
+    assert 0.99 * MOST_PASSES < passes_within(1.7, 1e-6) <= MOST_PASSES
+
+
+def test_more_quality_is_never_fewer_passes_of_path_and_always_more_cost():
+    of = ball_at(4)
+    plans = [select(of, quality, shader="path")[0] for quality in np.linspace(0, 1, 21)]
+    passes = [plan.passes for plan in plans]
+    assert all(b > a for a, b in pairwise(passes))
+    errors = [plan.predicted_error for plan in plans]
+    assert all(b < a for a, b in pairwise(errors))
+
+
+def test_the_picture_has_the_passes_of_its_most_demanding_object():
+    near, far = placed(BALL, translucent(0.8, 2.0), name="near"), placed(
+        shapes.moved(BALL, (0, 0, -400)), translucent(0.8, 2.0), name="far")  # fmt: skip
+    of, _ = admit(scene([near, far], [SIDE_LIGHT], camera((0, 0, 4), resolution=(160, 160))))
+    plans = select(of, 0.8)
+    assert plans[0].passes > plans[1].passes >= 1
+    assert picture_passes(plans) == plans[0].passes
+    assert [plan.passes for plan in select(of, 0.8, passes=7)] == [7, 7]
+
+
+# ---- candidates and a target error ----
+
+
+def test_every_candidate_has_an_error_a_bound_and_seconds():
+    (plan,) = select(ball_at(4), 0.7, threads=1)
+    assert [one.shader for one in plan.candidates] == list(CHEAPEST_FIRST)
+    for one in plan.candidates:
+        assert 0 < one.predicted_error <= one.error_bound and one.predicted_seconds > 0 and one.passes >= 1
+    (twice,) = select(ball_at(4), 0.7, threads=2)
+    assert twice.candidates[3].predicted_seconds == pytest.approx(plan.candidates[3].predicted_seconds / 2)
+
+
+def test_dense_bright_media_cost_path_more_and_others_as_much():
+    grey, white = (select(ball_at(4, material=translucent(*medium)), passes=10, threads=1)[0].candidates
+                   for medium in ((0.5, 2.0), (0.999, 50.0)))  # fmt: skip
+    assert white[3].predicted_seconds > 5 * grey[3].predicted_seconds
+    assert white[2].predicted_seconds == grey[2].predicted_seconds
+
+
+def test_a_target_error_excludes_shaders_that_may_exceed_it_at_any_distance():
+    for distance in (3, 30, 300, 3000):
+        for target in (0.5, 0.2, 0.05, 0.01):
+            (plan,) = select(ball_at(distance), target_error=target)
+            assert plan.tolerance == target
+            by_name = {one.shader: one for one in plan.candidates}
+            for name in plan.shares:
+                assert name == "path" or by_name[name].error_bound <= target
+    assert "target error 1 %" in plan.reason
+
+
+def test_a_wide_target_takes_the_cheapest_and_a_wish_outranks_it():
+    assert chosen(ball_at(4), target_error=10.0) == "diffuse"
+    assert chosen(ball_at(4), shader="plumb", target_error=0.001) == "plumb"
+
+
+def test_what_a_pilot_measured_replaces_the_prediction():
+    errors = {"diffuse": Error(0.5, 0.6), "scalar": Error(0.001, 0.002), "plumb": Error(0.001, 0.002)}
+    found = {"thing": Measured(errors, Error(0.4, 0.5))}
+    (plan,) = select(ball_at(3), 0.7, measured=found, passes=100)
+    assert plan.shader == "scalar" and plan.predicted_error == 0.001 and all(one.measured for one in plan.candidates)
+    assert plan.candidates[3].predicted_error == pytest.approx(0.04)
+    (other,) = select(ball_at(3), 0.7, measured={"somebody else": found["thing"]}, passes=100)
+    assert not other.candidates[0].measured
+
+
+# ---- cross-fades ----
+
+
+def test_a_share_is_half_at_the_threshold_and_whole_beyond_the_fade():
+    demand = Demand(0.5)
+    threshold = 64 / (0.06 / 0.03 - 1)
+    assert demand.tolerance(threshold) == pytest.approx(0.06)
+    assert demand.share(0.06, threshold) == pytest.approx(0.5)
+    assert demand.share(0.06, threshold * (1 - FADE)) == 1 and demand.share(0.06, threshold * (1 + FADE)) == 0
+    assert 0 < demand.share(0.06, threshold * (1 + 0.9 * FADE)) < 0.1
+    assert demand.share(0.02, 1e9) == 1  # right enough at any size
+    assert [demand.share(0.06, threshold * k, fade=False) for k in (0.99, 1.01)] == [1, 0]
+
+
+def test_shares_add_up_and_change_little_from_frame_to_frame():
+    """1 % a frame, as a dolly goes: where the error stays, a smoothstep over 30 % in n rises by at most 1.5 / 30 a
+    percent; where it falls with the distance as well, by some times that. A switch would be 1."""
+    before, of = None, ball_at(20)
+    mixed = 0
+    for distance in np.geomspace(20, 2000, 465):
+        at = replace(of, camera=camera((0, 0, distance), resolution=(160, 160)))
+        (plan,) = select(at, 0.7)
+        assert sum(plan.shares.values()) == pytest.approx(1)
+        assert plan.shader == max(plan.shares, key=plan.shares.__getitem__)
+        shares = np.array([plan.shares.get(name, 0.0) for name in CHEAPEST_FIRST])
+        if before is not None:
+            assert np.abs(shares - before).max() < 0.15
+        before = shares
+        mixed += len(plan.shares) > 1
+    assert mixed > 20
+
+
+def test_a_matched_body_is_one_or_the_other():
+    """Shadow rays pass it where path lights it, and only there."""
+    matched = translucent(0.8, 2.0, ior=1.0)
+    for distance in np.geomspace(3, 5000, 200):
+        assert len(select(ball_at(distance, material=matched), 0.7)[0].shares) == 1
 
 
 def test_how_a_ball_stands_in_the_picture():
