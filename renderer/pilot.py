@@ -32,6 +32,7 @@ MOST_PASSES = 512
 FRAME = 1.15
 """Height of the pilot over the diameter of the object's bounding ball."""
 NOISE_MARGIN = 1.1
+_FEW_PIXELS = 8
 _SEED = 0x5EED
 
 
@@ -54,22 +55,25 @@ def measure(scene: Scene, settings: Settings, progress: Callable[[float], None] 
     ]
     found = {}
     for index in wanted:
-        found[scene.objects[index].name] = pilot(scene, index, settings)
+        measured = pilot(scene, index, settings)
+        if measured is not None:
+            found[scene.objects[index].name] = measured
         if progress is not None:
             progress(1 / len(wanted))
     return found
 
 
-def pilot(scene: Scene, index: int, settings: Settings) -> Measured:
-    """What small pictures of the object ``index`` tell."""
+def pilot(scene: Scene, index: int, settings: Settings, passes: int | None = None) -> Measured | None:
+    """What small pictures of the object ``index`` tell, of so many passes of path in each half (None:
+    ``PASSES``). None where no pixel shows it."""
     thing = scene.objects[index]
     side = int(np.clip(np.ceil(appearance(scene, thing).size_px * FRAME), LEAST_SIDE, SIDE))
     view = replace(scene, camera=_looking_at(scene.camera, thing, side), hash="")
     more = min((SIDE / side) ** 2, MOST_PASSES / PASSES)
-    halves, noise = _halves(view, index, "path", settings, int(PASSES * more))
+    halves, noise = _halves(view, index, "path", settings, int((passes or PASSES) * more))
     where = halves.pop()
-    if not where.any():
-        raise ValueError(f"{thing.name} fills no pixel of its pilot")
+    if where.sum() < 2:
+        return None
     mean = float(np.mean([half[where].mean() for half in halves]))
     mean = max(mean, 1e-12)
     errors = {}
@@ -91,8 +95,8 @@ def _relative(products: NDArray[np.float64], mean: float) -> Error:
 
 
 def _halves(scene: Scene, index: int, shader: str, settings: Settings, passes: int) -> tuple[list[NDArray], float]:
-    """Two independent means (h, w, 3) of so many passes each and the pixels that show nothing but the object; and the
-    standard deviation of a sample there, root mean square."""
+    """Two independent means (h, w, 3) of so many passes each and the pixels that show nothing but the object, or if
+    there are few, those whose middle shows it; and the standard deviation of a sample there, root mean square."""
     # diffuse is no wish of users
     lit = replace(scene.objects[index], shader=cast(ShaderChoice, shader))
     objects = tuple(lit if k == index else _out_of_the_way(thing) for k, thing in enumerate(scene.objects))
@@ -104,6 +108,8 @@ def _halves(scene: Scene, index: int, shader: str, settings: Settings, passes: i
         renderer.run(range(half * passes, (half + 1) * passes))
         films.append(renderer.film)
     where = films[0].object_pixels() & films[1].object_pixels() & (renderer.object_id == index)
+    if where.sum() < _FEW_PIXELS:
+        where = renderer.object_id == index
     variance = films[0].stderr()[where] ** 2 * passes
     return [*(film.mean() for film in films), where], float(np.sqrt(variance.mean())) if variance.size else 0.0
 

@@ -33,7 +33,8 @@ class Blend:
 
     def choose(self, streams: NDArray[np.uint64]) -> NDArray[np.int8]:
         """(n,) which of ``bodies`` lights the camera samples with the streams ``streams`` (n,)."""
-        words = (streams ^ _CHOICE) + GOLDEN * np.uint64(self.index + 1)
+        words = streams ^ _CHOICE
+        words += np.uint64((self.index + 1) * int(GOLDEN) % 2**64)
         mix(words, words, np.empty_like(words))
         uniform = (words >> np.uint64(11)) * 2.0**-53
         return np.searchsorted(np.cumsum(self.shares)[:-1], uniform, side="right").astype(np.int8)

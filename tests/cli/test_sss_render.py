@@ -446,3 +446,73 @@ def test_too_little_memory_is_one_line(workplace, capsys):
     error = capsys.readouterr().err
     assert "out of memory" in error and "--max-memory" in error and error.count("\n") == 1
     assert not Path("out.npz").exists()
+
+
+# ---- explanation, quality, pilots ----
+
+
+def explained(*arguments, status=0):
+    assert main(["scene.toml", "--explain-only", "--report", "report.json", *map(str, arguments)]) == status
+    return json.loads(Path("report.json").read_text())
+
+
+def test_explain_only_says_everything_and_renders_nothing(workplace, capsys, monkeypatch):
+    def never(*_arguments, **_options):
+        raise AssertionError("nothing is to be traced")
+
+    monkeypatch.setattr("renderer.render.TracedScene", never)
+    report = explained("--quality", 0.3)
+    text = capsys.readouterr().out
+    for part in ("ball: closed", "hole handling strict", "distance", "pixels across", "mean free path", "diffuse",
+                 "scalar", "plumb", "path", "tolerance", "passes"):  # fmt: skip
+        assert part in text
+    (thing,) = report["objects"]
+    assert [one["shader"] for one in thing["candidates"]] == ["diffuse", "scalar", "plumb", "path"]
+    for one in thing["candidates"]:
+        assert one["predicted_error"] > 0 and one["predicted_seconds"] > 0 and one["passes"] >= 1
+    assert report["explained_only"] and report["passes"] == thing["passes"]
+    assert sorted(path.name for path in workplace.iterdir()) == ["ball.ply", "report.json", "scene.toml"]
+
+
+def test_without_explain_only_an_output_must_be_named(workplace, capsys):
+    assert main(["scene.toml"]) == 2
+    assert "-o/--output" in capsys.readouterr().err
+
+
+def test_the_quality_decides_the_passes_unless_they_are_given(workplace):
+    few, more = (explained("--shader", "path", "--quality", q)["passes"] for q in (0, 0.3))
+    assert 1 <= few < more
+    assert render("--quality", 0, "--size", "6x5")["passes"] == explained(
+        "--shader", "path", "--quality", 0, "--size", "6x5")["passes"]  # fmt: skip
+    assert render("--quality", 0, "--passes", 3, "--size", "6x5")["passes"] == 3
+    # without --quality as ever
+    assert explained("--shader", "scalar")["passes"] == 64
+
+
+def test_a_target_error_chooses_the_shader_unless_a_quality_does(workplace):
+    assert main(["scene.toml", "--explain-only", "--target-error", "10", "--report", "report.json"]) == 0
+    report = json.loads(Path("report.json").read_text())
+    assert report["objects"][0]["shader"] == "diffuse" and report["objects"][0]["tolerance"] == 10
+    report = explained("--target-error", 10, "--quality", 1)
+    assert report["objects"][0]["shader"] == "path" and "quality 1" in report["objects"][0]["reason"]
+
+
+def test_a_pilot_replaces_the_prediction(workplace, monkeypatch):
+    monkeypatch.setattr("renderer.pilot.PASSES", 2)
+    report = explained("--pilot", "--threads", 1)
+    assert all(one["measured"] for one in report["objects"][0]["candidates"])
+    assert report["seconds"]["pilot"] > 0
+
+
+def test_predicted_error_is_an_array_and_in_the_report(workplace):
+    arrays = render("--passes", 4, "--aov", "predicted_error,shader_id", "--report", "report.json")
+    (thing,) = json.loads(Path("report.json").read_text())["objects"]
+    assert arrays["predicted_error"][10, 12] == pytest.approx(thing["predicted_error"], rel=1e-6)
+    assert np.isnan(arrays["predicted_error"][0, 0]) and arrays["shader_id"].dtype == np.int32
+
+
+def test_the_report_says_what_was_built_for_whom(workplace):
+    assert reported("--passes", 1)["built"]["objects"] == {}
+    built = reported("--passes", 1, "--shader", "scalar")["built"]
+    assert set(built["objects"]["ball"]) == {"curvature", "table of balls"}
+    assert built["scene"]["triangles and beams of light"] > 0

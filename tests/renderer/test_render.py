@@ -175,3 +175,38 @@ def test_rendering_pass_after_pass_does_not_grow():
     renderer.run(range(3, 20))
     # kilobytes; one pass has 64 * 64 * 3 * 4 = 48 kB of radiance alone
     assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < 20_000
+
+
+# ---- no more than a scene needs ----
+
+
+def test_nothing_is_built_for_a_shader_that_does_not_need_it(monkeypatch):
+    """A far object, diffuse, beside a near one lit by path: no curvature, no table; and each part is said to have been
+    built for the object that needs it."""
+
+    def never(*_arguments):
+        raise AssertionError("built in vain")
+
+    things = [
+        placed(shapes.moved(shapes.icosphere(1.0, 2), (0, 0, -z)), translucent(0.8, 2.0), name=str(z))
+        for z in (0, 4000)
+    ]
+    of = scene(things, [WHITE_SKY], camera((0, 0, 4), resolution=(64, 64)))
+    with monkeypatch.context() as patch:
+        patch.setattr("sss_tools.curvature.mean_curvature", never)
+        patch.setattr("renderer.shaders.surface.ball_table", never)
+        renderer = Renderer(of, Settings(quality=0.9))
+        assert [plan.shader for plan in renderer.plans] == ["path", "diffuse"]
+        assert set(renderer.stages.parts) == {""}
+        with pytest.raises(AssertionError, match="in vain"):
+            Renderer(of, Settings(shader="scalar"))
+    renderer = Renderer(replace(of, objects=(replace(things[0], shader="plumb"), things[1])), Settings(quality=0.9))
+    assert set(renderer.stages.parts) == {"", "0"}
+    assert set(renderer.stages.parts["0"]) == {"curvature", "table of balls", "light of the sky at corners"}
+
+
+def test_the_grid_is_built_for_dense_bright_bodies_lit_by_path_alone():
+    dense = placed(shapes.icosphere(1.0, 3), translucent(0.999, 60.0), name="dense")
+    of = scene([dense], [WHITE_SKY], camera((0, 0, 4), resolution=(256, 256)))
+    assert "distance grid and ball jumps" in Renderer(of, Settings(shader="path")).stages.parts[""]
+    assert "distance grid and ball jumps" not in Renderer(of, Settings(shader="scalar")).stages.parts[""]
