@@ -207,7 +207,8 @@ class _Chooser:
         elif wanted != "auto":
             shares, reason = {wanted: 1.0}, "asked for"
         else:
-            shares = _shares({one.shader: one.error_bound for one in candidates}, self.demand, look.size_px, thing)
+            bounds = {one.shader: one.error_bound for one in candidates}
+            shares = shares_of(bounds, self.demand, look.size_px, _fades(thing))
             reason = self._reason(shares, candidates, allowed, look.size_px)
         if candidates:
             chosen = [(shares[one.shader], one) for one in candidates if one.shader in shares]
@@ -257,11 +258,12 @@ class _Chooser:
         return f"the cheapest {right} right enough: {_percent(by_name[chosen])} wrong; {where}"
 
 
-def _shares(bounds: Mapping[str, float], demand: Demand, size_px: float, thing: SceneObject) -> dict[str, float]:
+def shares_of(bounds: Mapping[str, float], demand: Demand, size_px: float, fade: bool = True) -> dict[str, float]:
     """Of the camera samples, by shader: one with the uniform u takes the cheapest that is good enough for more than u
-    of them."""
-    # shadow rays pass a body of index 1 that path lights, and end at others: it must be one or the other
-    fade = isinstance(thing.material, Translucent) and thing.material.medium.ior != 1
+    of them.
+
+    bounds  errors that count, of each shader but path
+    """
     shares, taken = {}, 0.0
     for name in CHEAPEST_FIRST:
         enough = 1.0 if name == "path" else demand.share(bounds[name], size_px, fade)
@@ -269,6 +271,11 @@ def _shares(bounds: Mapping[str, float], demand: Demand, size_px: float, thing: 
             shares[name] = enough - taken
             taken = enough
     return shares
+
+
+def _fades(thing: SceneObject) -> bool:
+    """Shadow rays pass a body of index 1 that path lights, and end at others: it must be one or the other."""
+    return isinstance(thing.material, Translucent) and bool(thing.material.medium.ior != 1)
 
 
 def thresholds(scene: Scene, thing: SceneObject, quality: float = DEFAULT_QUALITY) -> list[tuple[float, str, str]]:
@@ -284,7 +291,7 @@ def thresholds(scene: Scene, thing: SceneObject, quality: float = DEFAULT_QUALIT
         footprint = pixel_footprint(camera, float(distance))
         there = replace(look, footprint=footprint, size_px=size / footprint)
         bounds = {name: error.bound for name, error in predicted_errors(there).items()}
-        shares = _shares(bounds, Demand(quality), there.size_px, thing)
+        shares = shares_of(bounds, Demand(quality), there.size_px, _fades(thing))
         chosen.append(max(shares, key=shares.__getitem__))
     return [
         (float(distances[k]), chosen[k - 1], chosen[k]) for k in range(1, len(chosen)) if chosen[k] != chosen[k - 1]
