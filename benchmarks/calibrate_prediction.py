@@ -4,8 +4,8 @@
 
 Cases are drawn by ``prediction_cases.py`` and measured by pilots (see ``renderer/pilot.py``); what was measured is kept
 in out/prediction/, so that the script can be ended and goes on. Remove that folder when a shader has changed. The
-correction of each prediction in the logarithm is linear in few features; a ridge keeps the coefficients of what was
-hardly measured near zero, where the prediction is the one before. Residuals are those of cases left out one at a time.
+logarithm of each prediction is linear in few features; a ridge keeps the coefficients of what was hardly measured near
+zero. Residuals are those of cases left out one at a time.
 Writes ``renderer/shaders/prediction.json``; ``--dry`` only prints it.
 """
 
@@ -16,12 +16,15 @@ import json
 from pathlib import Path
 
 import numpy as np
+from scipy.optimize import lsq_linear
 
 from benchmarks.prediction_cases import Case, measured_cases
-from renderer.shaders.prediction import FEATURES, FILE, LEAST, MOST, START_NOISE, features, starts
+from renderer.shaders.prediction import FEATURES, FILE, LEAST, MOST, START, features
+from renderer.shaders.selection import Demand, shares_of
 
 SEED = 1
-RIDGE = 1.0
+RIDGE = 2.0
+QUALITIES = np.linspace(0, 0.8, 17)
 CONFIDENCE = 0.95
 STORE = Path("out/prediction/fit.jsonl")
 
@@ -48,43 +51,66 @@ def main() -> None:
 
 def fitted(cases: list[Case]) -> dict[str, dict]:
     """The correction of each prediction, with its residuals."""
-    fits = {}
+    fits: dict[str, dict] = {}
+    predicted: dict[str, np.ndarray] = {}
     rows = np.array([features(case.look) for case in cases])
     for name in ("diffuse", "scalar", "plumb", "noise"):
-        start, found = (np.array(column) for column in zip(*(_pair(case, name) for case in cases), strict=True))
-        coefficients, residuals = ridge(rows, np.log(np.clip(found, LEAST, MOST) / start))
+        found = np.array([_found(case, name) for case in cases])
+        coefficients, residuals = ridge(rows, np.log(np.clip(found, LEAST, MOST) / START[name]))
         ratio = np.exp(np.abs(residuals))
+        predicted[name] = found / np.exp(residuals)
         fits[name] = {
             "coefficients": dict(zip(FEATURES, (round(float(c), 4) for c in coefficients), strict=True)),
             "scatter": round(float(residuals.std()), 3),
-            "margin": round(float(max(np.exp(np.quantile(residuals, CONFIDENCE)), 1)), 3),
+            "margin": 1.0,
             "within_factor_2": round(float((ratio <= 2).mean()), 3),
             "residual_quantiles": {
                 f"{q:g}": round(float(np.quantile(residuals, q)), 3) for q in (0.05, 0.25, 0.5, 0.75, 0.95)
             },
         }
+    least = margin(cases, predicted)
+    for name in ("diffuse", "scalar", "plumb"):
+        fits[name]["margin"] = least
     return fits
 
 
-def _pair(case: Case, name: str) -> tuple[float, float]:
-    """The start of the prediction, and what was measured."""
-    if name == "noise":
-        return START_NOISE, case.measured.noise.error
-    return starts(case.look)[name], case.measured.errors[name].error
+def margin(cases: list[Case], predicted: dict[str, np.ndarray]) -> float:
+    """The least factor on predicted errors with which ``CONFIDENCE`` of the choices of fast shaders are within the
+    tolerance, over ``QUALITIES``; each case predicted by a fit without it."""
+    for factor in np.arange(1.0, 4.0, 0.05):
+        within = []
+        for k, case in enumerate(cases):
+            for quality in QUALITIES:
+                demand, size = Demand(quality), case.look.size_px
+                shares = shares_of(
+                    {name: factor * predicted[name][k] for name in START if name != "noise"}, demand, size
+                )
+                if "path" not in shares:
+                    error = sum(share * _found(case, name) for name, share in shares.items())
+                    within.append(error <= demand.tolerance(size))
+        if np.mean(within) >= CONFIDENCE:
+            break
+    return round(float(factor), 3)
+
+
+def _found(case: Case, name: str) -> float:
+    return case.measured.noise.error if name == "noise" else case.measured.errors[name].error
 
 
 def ridge(rows: np.ndarray, wanted: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Coefficients, and the residuals (n,) of each case by a fit without it.
+    """Coefficients, and the residuals (n,) of each case by a fit without it."""
+    coefficients = _solved(rows, wanted)
+    every = np.arange(len(rows))
+    return coefficients, np.array([wanted[k] - rows[k] @ _solved(rows[every != k], wanted[every != k]) for k in every])
 
-    With the hat matrix H these are r_i / (1 - H_ii) (Allen 1974, "The relationship between variable selection and data
-    augmentation", Technometrics 16).
-    """
-    # the constant is free
-    penalty = RIDGE * np.diag([1e-9, *np.ones(rows.shape[1] - 1)])
-    inverse = np.linalg.inv(rows.T @ rows + penalty)
-    coefficients = inverse @ rows.T @ wanted
-    leverage = np.einsum("ij,jk,ik->i", rows, inverse, rows)
-    return coefficients, (wanted - rows @ coefficients) / np.maximum(1 - leverage, 1e-3)
+
+def _solved(rows: np.ndarray, wanted: np.ndarray) -> np.ndarray:
+    # the constant is free; what is blurred within a pixel shows less, never more, and at most in proportion
+    penalty = np.sqrt(RIDGE) * np.diag([1e-5, *np.ones(rows.shape[1] - 1)])
+    lowest, highest = np.full(len(FEATURES), -np.inf), np.full(len(FEATURES), np.inf)
+    lowest[FEATURES.index("blur")], highest[FEATURES.index("blur")] = 0, 1
+    whole = np.concatenate([rows, penalty]), np.concatenate([wanted, np.zeros(len(penalty))])
+    return lsq_linear(*whole, bounds=(lowest, highest)).x
 
 
 if __name__ == "__main__":

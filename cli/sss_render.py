@@ -327,11 +327,11 @@ def _explain_at_length(thing: SceneObject, plan: Plan, hole: HoleReport, source:
         f"{plan.mean_free_path_px:.3g} pixels"
     )
     if plan.candidates:
-        print(f"  {'shader':8}{'error':>9}{'at most':>9}{'passes':>8}{'seconds':>10}{'share':>7}")
+        print(f"  {'shader':8}{'error':>9}{'counted':>10}{'passes':>8}{'seconds':>10}{'share':>7}")
     for one in plan.candidates:
         share = plan.shares.get(one.shader, 0.0)
         print(
-            f"  {one.shader:8}{100 * one.predicted_error:>7.2g} %{100 * one.error_bound:>7.2g} %{one.passes:>8}"
+            f"  {one.shader:8}{_percentage(one.predicted_error):>9}{_percentage(one.error_bound):>10}{one.passes:>8}"
             f"{one.predicted_seconds:>10.2g}{100 * share:>5.3g} %"
         )
     print(f"  {plan.shader}: {plan.reason}")
@@ -351,6 +351,10 @@ def _explain(renderer: Renderer) -> None:
             f"hole handling {plan.hole_handling}{_expected(hole)}; "
             f"shader {plan.shader} at distance {plan.distance:.4g}: {plan.reason}"
         )
+
+
+def _percentage(share: float) -> str:
+    return f"{100 * share:.0f} %" if share >= 0.1 else f"{100 * share:.2g} %"
 
 
 def _expected(hole: HoleReport) -> str:

@@ -31,7 +31,6 @@ PASSES, FAST_PASSES = 32, 4
 MOST_PASSES = 512
 FRAME = 1.15
 """Height of the pilot over the diameter of the object's bounding ball."""
-NOISE_MARGIN = 1.1
 _FEW_PIXELS = 8
 _SEED = 0x5EED
 
@@ -82,7 +81,7 @@ def pilot(scene: Scene, index: int, settings: Settings, passes: int | None = Non
         products = ((halves[0] - first) * (halves[1] - second))[where]
         errors[name] = _relative(products, mean)
     noise = float(noise / mean)
-    return Measured(errors, Error(noise, noise * NOISE_MARGIN))
+    return Measured(errors, Error(noise, noise))
 
 
 def _relative(products: NDArray[np.float64], mean: float) -> Error:

@@ -40,7 +40,7 @@ class Candidate:
     """A shader that an object could have.
 
     predicted_error    of its light; of path, the noise after ``passes``
-    error_bound        what that exceeds in one case of twenty
+    error_bound        what is held against the tolerance: so much more that 19 of 20 choices prove right
     passes             those given, or as many as its noise needs to be within the tolerance
     predicted_seconds  wall seconds that the object's samples take in these passes, without set-up
     measured           whether a pilot measured the error
@@ -237,7 +237,7 @@ class _Chooser:
         noise = found.noise if found else predicted_noise(look)
         candidates = []
         for name in CHEAPEST_FIRST:
-            passes = self.passes or passes_within(noise.bound if name == "path" else FAST_NOISE, allowed)
+            passes = self.passes or passes_within(noise.error if name == "path" else FAST_NOISE, allowed)
             error = errors.get(name) or Error(noise.error * passes**-0.5, noise.bound * passes**-0.5)
             seconds = predicted_seconds(name, thing, look, passes, self.threads)
             candidates.append(Candidate(name, error.error, error.bound, passes, seconds, found is not None))
@@ -300,7 +300,7 @@ def thresholds(scene: Scene, thing: SceneObject, quality: float = DEFAULT_QUALIT
 
 def _percent(one: Candidate) -> str:
     text = f"{100 * one.predicted_error:.2g} %"
-    return text if one.error_bound == one.predicted_error else f"{text} (hardly above {100 * one.error_bound:.2g} %)"
+    return text if one.error_bound == one.predicted_error else f"{text} (counted as {100 * one.error_bound:.2g} %)"
 
 
 def _handling(thing: SceneObject, wish: str) -> tuple[str, str]:
