@@ -5,6 +5,7 @@ from renderer.optics.ball import ball_profile
 from renderer.shaders import scalar
 from renderer.shaders.surface import BodyOptics
 from sss_tools.medium import Medium
+from sss_tools.mesh import Mesh
 from sss_tools.shapes import box, icosphere, joined, moved
 
 RADIUS = 0.5
@@ -44,6 +45,18 @@ def test_opaque_things_shade_both_sides(stage):
     assert not scalar.exitance(stage.Objects(ball, screen), points, ball_body(), [light]).any()
     assert scalar.exitance(stage.Objects(ball), points, ball_body(), [light]).min() > 0
     assert scalar.exitance(stage.Objects(ball, screen), points, ball_body(), [stage.Point([0, 0, 1.4])]).min() > 0
+
+
+@pytest.mark.parametrize("slope", [0.0, 0.7, -2.0])
+def test_a_light_of_some_extent_does_not_shade_itself(stage, slope):
+    """Its own surface, oblique to the beam, stands in the scene where the feeler ends."""
+    ball, light = icosphere(RADIUS, 3), stage.Point([0, 0, 1.4])
+    corners = 0.3 * np.array([[-1, -1, -slope], [1, -1, slope], [1, 1, slope], [-1, 1, -slope]])
+    shining = moved(Mesh(corners, np.array([[0, 1, 2], [0, 2, 3]])), (0, 0, 1.4))
+    points, body = stage.vertex_points(ball, 1 / RADIUS), ball_body(0.25)
+    alone = scalar.exitance(stage.Objects(ball), points, body, [light])
+    np.testing.assert_array_equal(scalar.exitance(stage.Objects(ball, shining), points, body, [light]), alone)
+    assert alone.min() > 0
 
 
 def test_folds_are_dark_on_both_sides_of_the_terminator(stage):
