@@ -4,7 +4,7 @@
     seconds = passes * pixels * (c + d * collisions)          path
 
 over the number of threads. The collisions of a path are those of ``tracing.distance_grid.Walks``. The constants were
-measured on one machine (two threads of an AMD EPYC, see docs/walks.md and README.md) and set-up is left out: the
+measured on one machine (an AMD EPYC, see docs/walks.md and docs/fast_frames.md) and set-up is left out: the
 prediction tells shaders apart, and is right to a factor of two or so elsewhere.
 """
 
@@ -16,7 +16,7 @@ from ..scene.description import SceneObject, Translucent
 from ..tracing.distance_grid import Walks
 from .appearance import Appearance
 
-SECONDS = {"diffuse": (1.5e-6, 0.7e-6), "scalar": (1.5e-6, 0.8e-6), "plumb": (2e-6, 5e-6), "path": (3e-6, 0.5e-6)}
+SECONDS = {"diffuse": (0.8e-6, 0.25e-6), "scalar": (0.8e-6, 0.3e-6), "plumb": (0.9e-6, 0.75e-6), "path": (4e-6, 0.5e-6)}
 """c and d of each shader, for camera samples that meet the object."""
 
 
