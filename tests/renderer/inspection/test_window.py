@@ -139,7 +139,7 @@ LiveWindow._tell = tell
     window = Driver(screen, str(path), "--live", "-q", code=live)
     try:
         window.wait_for("ready")
-        first = window.wait_for("path, 2 passes, standard error")
+        first = window.wait_for("standard error")
         window.hand("mousemove", "240", "240")
         window.hand("mousedown", "1")
         for x in (260, 300, 340):
@@ -147,7 +147,7 @@ LiveWindow._tell = tell
         moving = window.wait_for("pictures/s")
         window.hand("mouseup", "1")
         window.hand("click", "4")
-        rest = window.wait_for("path, 2 passes, standard error")
+        rest = window.wait_for("standard error")
         places = [line[line.index("[") :] for line in (first, moving, rest)]
         assert len(set(places)) == 3
         window.hand("key", "q")
