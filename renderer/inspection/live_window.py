@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from .live import Live
 
-TICK = 40
-"""Milliseconds between looks at what there is to do."""
+TICK = 0.02
+"""Seconds between looks at what there is to do."""
 REST = 0.25
 """Seconds without movement after which the reference begins."""
 
@@ -44,16 +44,18 @@ class LiveWindow:
             ("LeftButtonPressEvent", self._press), ("LeftButtonReleaseEvent", self._release),
             ("MouseMoveEvent", self._drag), ("MouseWheelForwardEvent", lambda *_: self._approach(0.9)),
             ("MouseWheelBackwardEvent", lambda *_: self._approach(1 / 0.9)), ("KeyPressEvent", self._key),
-            ("TimerEvent", self._tick),
         ):  # fmt: skip
             self._interactor.AddObserver(event, act)
 
     def run(self) -> None:
         """Show it until it is closed."""
         self._interactor.Initialize()
-        self._interactor.CreateRepeatingTimer(TICK)
         self._tell("ready")
-        self._interactor.Start()
+        # VTK's own loop holds Python's lock while it waits, and the passes of the reference with it
+        while not self._interactor.GetDone():
+            self._interactor.ProcessEvents()
+            self._tick()
+            time.sleep(TICK)
         self.live.close()
 
     def _press(self, *_: Any) -> None:
@@ -77,7 +79,7 @@ class LiveWindow:
         if self._interactor.GetKeySym() in ("q", "Escape"):
             self._interactor.TerminateApp()
 
-    def _tick(self, *_: Any) -> None:
+    def _tick(self) -> None:
         if self._dirty:
             self._dirty = False
             begun = time.perf_counter()

@@ -136,7 +136,9 @@ LiveWindow._tell = tell
 """
         + code[code.index("from cli") :]
     )
-    window = Driver(screen, str(path), "--live", "-q", code=live)
+    # two millimetres of ketchup: few collisions, and passes take a fraction of a second
+    look = [str(path), "--live", "--size", "500x400", "--material", "ketchup", "--unit", "mm", "-q"]
+    window = Driver(screen, *look, code=live)
     try:
         window.wait_for("ready")
         first = window.wait_for("standard error")
