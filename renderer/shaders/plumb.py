@@ -125,7 +125,8 @@ def solved_body(body: BodyOptics, x: Float32, radius: Float32, curvature: Float3
         B + w (S - B) for w = (1 - R_e H) x^2 > 0,   B (S/B)^w, R_e H at most 2, else
 
     with S the slab's at the thickness d |x| = 2 R_e x^2 that it has if the chord crosses it. A plane lit straight on is
-    the slab, and what is rounder than the ball is as far from the slab on the other side. x^2 fades the slab out
+    the slab, and what is rounder than the ball is as far from the slab on the other side, but between the ball of the
+    chord and that of the curvature: a thick slab is so dark that nothing is as far from it. x^2 fades the slab out
     towards the terminator, where its thickness and its light tend to nothing.
     """
     ball = body.ball_exitance(x, radius)
@@ -138,6 +139,8 @@ def solved_body(body: BodyOptics, x: Float32, radius: Float32, curvature: Float3
         floor = np.float32(1e-9)
         apart = np.maximum(slab[:, long], floor) / np.maximum(ball[:, long], floor)
         bent = ball[:, long] * np.power(apart, weight[long])
+        round_ = body.ball_exitance(x[long], body.curvature_radius(curvature[long]))
+        np.clip(bent, np.minimum(ball[:, long], round_), np.maximum(ball[:, long], round_), out=bent)
     slab -= ball
     slab *= weight
     slab += ball

@@ -202,7 +202,8 @@ class BodyOptics:
         """Turn exitance (3, n) of balls under a beam into what the viewer sees of it, in place.
 
         That is the exitance of a surface that is as bright from all sides and sends the viewer the same radiance:
-        the ball's two parts of ``optics.emergence`` over its exitance. Nothing is done where nobody views.
+        the exitance times the ball's share and directions of light scattered often, plus the ball's light scattered
+        once (``optics.emergence``). Nothing is done where nobody views.
         """
         if points.viewer is None:
             return
@@ -228,10 +229,9 @@ class BodyOptics:
             falls *= lookup.interpolate(table.slope, rows, columns)
             often = np.where(falls > 0, 1 / (1 + np.maximum(falls, 0)), 1 - falls)
             often *= (1 - share) * (np.float32(table.norm) + np.float32(table.norm * table.depth) * inside)
-            ball = lookup.interpolate(self.tables[channel].ball, rows, columns)
-            unit = np.float32(table.unit * self.medium.reduced_albedo[channel])
-            often += unit * once / np.maximum(ball, np.float32(1e-9))
             exitance[channel] *= often
+            # not bent with the rest: over a ball that is all but dark it would be anything
+            exitance[channel] += np.float32(table.unit * self.medium.reduced_albedo[channel]) * once
 
     def slab_exitance(self, x: Float32, thickness: Float32) -> Float32:
         """(3, n) exitance of the slab per irradiance, at signed cosines; see ``BallTable.slab``."""

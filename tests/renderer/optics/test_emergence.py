@@ -79,9 +79,13 @@ def seen_from_everywhere(body, x, radius, views=48, azimuths=64):
     normal = np.repeat(np.array([[0], [0], [1]], np.float32), n, axis=1)
     light = np.repeat(np.array([[np.sqrt(1 - x * x)], [0], [x]], np.float32), n, axis=1)
     points = SurfacePoints(np.zeros((3, n), np.float32), normal, np.zeros(n, np.float32), viewer)
-    seen = np.ones((3, n), np.float32)
-    body.seen(seen, np.full(n, x, np.float32), np.full(n, radius, np.float32), points, light)
+    at = np.full(n, x, np.float32), np.full(n, radius, np.float32)
+    exitance = body.ball_exitance(*at)
+    seen = exitance.copy()
+    body.seen(seen, *at, points, light)
     assert seen.min() >= 0
+    # the table is exactly dark opposite large absorbing balls
+    seen = np.divide(seen, exitance, out=np.ones_like(seen), where=(exitance > 0) | (seen > 0))
     through = 1 - fresnel_reflectance(mu, body.ior)[0]
     return 2 * (seen * (weight * mu * through)).sum(axis=1) / (1 - diffuse_external_reflectance(body.ior))
 

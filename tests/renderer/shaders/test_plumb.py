@@ -219,3 +219,15 @@ def test_no_points_are_no_problem(stage):
     ball = icosphere(RADIUS, 1)
     none = stage.vertex_points(ball, 1.0).take(np.arange(0))
     assert plumb.exitance(stage.Objects(ball), none, ball_body(), [stage.Ambient()]).shape == (3, 0)
+
+
+@pytest.mark.parametrize("curvature", [2.0, 20.0, 200.0])
+def test_a_body_rounder_than_its_chord_is_between_the_balls_of_chord_and_curvature(curvature):
+    """Opposite a thick, all but black slab nothing may be as far above the ball: thin ears had blue streaks."""
+    body = BodyOptics.prepare(0, Medium.from_albedo((0.99, 0.95, 0.6), 1 / 0.01), 1.0)
+    x = np.linspace(-1, 1, 201, dtype=np.float32)
+    radius, bent = np.full_like(x, 2.0), np.full_like(x, curvature)
+    found = plumb.solved_body(body, x, radius, bent)
+    of_chord, of_curvature = body.ball_exitance(x, radius), body.ball_exitance(x, body.curvature_radius(bent))
+    assert (found <= np.maximum(of_chord, of_curvature) * (1 + 1e-6)).all()
+    assert (found >= np.minimum(of_chord, of_curvature) * (1 - 1e-6)).all()
