@@ -70,7 +70,7 @@ def ours(options: argparse.Namespace) -> dict:
 
     def seconds_left() -> float:
         # as for --time: fewer passes at once towards the end, for what is under way then is lost
-        return begun + options.seconds - time.monotonic() if renderer.film.passes >= LEAST else 1e6
+        return begun + options.seconds - time.monotonic()
 
     renderer.run(count(), done, seconds_left)
     film = renderer.film

@@ -26,9 +26,11 @@ from renderer.optics.guided_flight import Guide
 from renderer.scene.camera import CameraRays
 from renderer.scene.description import Translucent
 from renderer.scene.staging import stage_mesh
+from renderer.strips import Assembly, Strips
 from renderer.tracing.acceleration import Acceleration
 from renderer.tracing.distance_grid import DistanceGrid
 from renderer.tracing.memory import keep_freed_memory
+from renderer.tracing.tally import Tally
 from renderer.tracing.traced_scene import TracedScene
 from renderer.wavefront import Wavefront
 from sss_tools.elephant import elephant
@@ -101,26 +103,36 @@ def measure(mesh, albedo: float, mean_free_path: float, passes: int) -> dict:
             "tables_seconds": tables_seconds, "chosen": describe(chosen), "ways": rows}  # fmt: skip
 
 
+def passes_of(tracer: Wavefront, passes: range) -> tuple[list[tuple], Tally]:
+    """Some passes as ``Assembly`` gives them, and what was counted."""
+    pixels = np.arange(SIZE[0] * SIZE[1])
+    assembly, tally, done = Assembly(len(pixels)), Tally(), []
+    for strip in tracer.trace(Strips(passes, pixels, 1, 2**13)):
+        tally.add(strip.tally)
+        done += assembly.add(strip)
+    return done, tally
+
+
 def way_measured(traced: TracedScene, camera: CameraRays, way: Acceleration, passes: int) -> dict:
     """Median CPU speed of a few runs, and the noise of all of them."""
     pixels = SIZE[0] * SIZE[1]
     tracer = Wavefront(traced, camera, {}, 1, acceleration=way)
-    tracer.trace(10**6, 0, pixels, 2)
-    seconds, samples = [], []
+    passes_of(tracer, range(10**6, 10**6 + 2))
+    seconds, samples, tally = [], [], Tally()
     for run in range(RUNS):
         start = time.thread_time()
-        traced_samples = tracer.trace(run * passes, 0, pixels, passes)
+        made, tally = passes_of(tracer, range(run * passes, (run + 1) * passes))
         seconds.append(time.thread_time() - start)
-        samples.append(traced_samples.radiance.reshape(3, passes, pixels))
-        shown = traced_samples.first_object.reshape(passes, pixels)
-    samples = np.concatenate(samples, axis=1).astype(float)[:, :, (shown == 0).all(axis=0)]
-    mean, deviation = samples.mean(axis=1), samples.std(axis=1, ddof=1)
-    walks = traced_samples.passes * samples.shape[2]
+        samples += [radiance for _, radiance, _ in made]
+        shown = np.stack([first_object for _, _, first_object in made])
+    inside = np.stack(samples).astype(float)[:, (shown == 0).all(axis=0)]
+    mean, deviation = inside.mean(axis=0), inside.std(axis=0, ddof=1)
+    walks = passes * inside.shape[1]
     return {
         "speed": passes * pixels / statistics.median(seconds),
         "noise": float(np.sqrt(np.mean(deviation**2) / np.mean(mean) ** 2)),
-        "collisions": traced_samples.tally.collisions / walks,
-        "rays": traced_samples.tally.rays / walks,
+        "collisions": tally.collisions / walks,
+        "rays": tally.rays / walks,
     }
 
 
@@ -130,13 +142,15 @@ def scaling(mesh, albedo: float, mean_free_path: float, block: int, passes: int)
     way, pixels = Acceleration.chosen(traced, 250_000), SIZE[0] * SIZE[1]
     tracers = [Wavefront(traced, camera, {}, 1, block, way) for _ in range(2)]
     for tracer in tracers:
-        tracer.trace(10**6, 0, pixels, 2)
+        passes_of(tracer, range(10**6, 10**6 + 2))
     speeds: dict[int, list[float]] = {1: [], 2: []}
     with ThreadPoolExecutor(2) as pool:
         for _ in range(RUNS):
             for threads in speeds:
                 start = time.perf_counter()
-                units = [pool.submit(tracers[k].trace, k * passes, 0, pixels, passes) for k in range(threads)]
+                units = [
+                    pool.submit(passes_of, tracers[k], range(k * passes, (k + 1) * passes)) for k in range(threads)
+                ]
                 for unit in units:
                     unit.result()
                 speeds[threads].append(threads * passes * pixels / (time.perf_counter() - start))

@@ -7,7 +7,7 @@ number. The picture is the wavefront's, which takes all other scenes, to roundin
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, fields, replace
 from typing import Self, TypeVar
 
@@ -22,12 +22,12 @@ from .scene.camera import CameraRays
 from .scene.coverage import covered_pixels
 from .shaders.fast_body import FastBody, keep_outside
 from .shaders.surface import SurfacePoints, exit_share
+from .strips import NOTHING, Strip, Strips, TracedStrip
 from .tracing.paths import ROULETTE_BELOW
 from .tracing.roulette import FREE_SURFACES, LASTING, MANY_SURFACES
 from .tracing.streams import Uniforms, stream_keys
 from .tracing.tally import Tally
 from .tracing.traced_scene import TracedScene
-from .wavefront import NOTHING, Samples, Stopped
 
 Float32 = NDArray[np.float32]
 
@@ -192,35 +192,38 @@ class DirectTracer:
         self._frames = frames
         self._uniforms = Uniforms(BLOCK)
 
-    def trace(
-        self,
-        first_pass: int,
-        first_pixel: int,
-        last_pixel: int,
-        passes: int = 1,
-        chosen: NDArray[np.int64] | None = None,
-        stopped: Callable[[], bool] | None = None,
-    ) -> Samples:
-        """As ``Wavefront.trace``, one pass at a time."""
-        if passes > 1:
-            raise ValueError("fast shaders take one pass at a time")
-        count = last_pixel - first_pixel
-        pixels = np.arange(first_pixel, last_pixel) if chosen is None else chosen[first_pixel:last_pixel]
-        frame = _Frame(self._frames, self._uniforms, first_pass, pixels)
+    def trace(self, strips: Strips) -> Iterator[TracedStrip]:
+        """As ``Wavefront.trace``, one strip at a time."""
+        while not strips.stopped:
+            strip = strips.take()
+            if strip is None:
+                if strips.over:
+                    return
+                strips.wait()
+                continue
+            traced = self._traced(strip, strips)
+            if traced is not None:
+                strips.note(len(strip.pixels), 0)
+                yield traced
+
+    def _traced(self, strip: Strip, strips: Strips) -> TracedStrip | None:
+        """The strip with its samples; None where they are no longer wanted."""
+        pixels, covered = strip.pixels, self._frames.covered[strip.pixels]
+        frame = _Frame(self._frames, self._uniforms, strip.pass_index, pixels)
         surfaces = 0
-        meeting = [frame.from_camera(sample) for sample in _parts(np.flatnonzero(self._frames.covered[pixels]))]
+        meeting = [frame.from_camera(sample) for sample in _parts(np.flatnonzero(covered))]
         while meeting:
             surfaces += 1
             reflected = []
             for part in _blocks(meeting):
-                if stopped is not None and stopped():
-                    raise Stopped
+                if strips.stopped:
+                    return None
                 reflected.append(frame.roulette(frame.light(part), surfaces))
             meeting = [frame.cast(part) for part in _blocks(reflected)]
-        frame.see_nothing(np.flatnonzero(~self._frames.covered[pixels]))
+        frame.see_nothing(np.flatnonzero(~covered))
         tally = Tally()
-        tally.rays, tally.samples = frame.rays, count
-        return Samples(frame.radiance.T, frame.first_object, 1, tally)
+        tally.rays, tally.samples = frame.rays, len(pixels)
+        return TracedStrip(strip, frame.radiance.T, frame.first_object, tally)
 
 
 def _parts(columns: NDArray[np.intp]) -> list[NDArray[np.intp]]:

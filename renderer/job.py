@@ -101,13 +101,11 @@ def execute(
         kept.append(_Refreshed(preview))
     if resume:
         renderer.film = _resumed(renderer.film, output, checkpoint)
-    pass_at = time.monotonic()
-    pass_seconds, error = 0.0, float("nan")
+    error = float("nan")
 
     def finished() -> bool:
         if budget.seconds is not None:
-            # half of the next pass is under way; what will not be done in time would be dropped
-            return pass_seconds / 2 > seconds_left()
+            return seconds_left() <= 0
         return budget.target_error is not None and _enough(renderer.film, error, budget.target_error)
 
     def seconds_left() -> float:
@@ -116,9 +114,8 @@ def execute(
         return budget.started + budget.seconds - time.monotonic() - writing
 
     def after_pass(index: int) -> bool:
-        nonlocal pass_at, pass_seconds, error
+        nonlocal error
         now = time.monotonic()
-        pass_seconds, pass_at = now - pass_at, now
         if budget.target_error is not None:
             error = renderer.film.mean_relative_stderr()
         for file in kept:

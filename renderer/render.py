@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 import os
-import threading
 import time
-from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from hashlib import blake2b
-from itertools import islice, pairwise
 from queue import Empty, SimpleQueue
 
 import numpy as np
@@ -31,21 +28,18 @@ from .shaders.blend import Blend
 from .shaders.fast_body import FastBody
 from .shaders.selection import DEFAULT_QUALITY, Measured, Plan
 from .shaders.surface import BodyOptics
+from .strips import NOTHING, Assembly, Strips, TracedStrip
 from .tracing.acceleration import Acceleration
 from .tracing.memory import keep_freed_memory
 from .tracing.tally import Tally
 from .tracing.traced_scene import TracedObject, TracedScene
-from .wavefront import NOTHING, Samples, Wavefront
+from .wavefront import Wavefront
 
 SHADER_ID = {"path": 0, "plumb": 1, "scalar": 2, "diffuse": 3}
 """In pictures; opaque objects and the background have -1."""
-_UNIT_SAMPLES = 2**19
-"""Camera samples of a work unit, at most. The last paths of a unit walk on in ever smaller company, up to a thousand
-steps in dense media, so units grow while they take less than ``_UNIT_SECONDS``; small pictures take many passes at
-once."""
-_UNIT_SECONDS = 2.0
-_LEAST_UNIT_PIXELS = 8192
-_FIRST_SAMPLES = 2**13
+_STRIP, _FRAME_STRIP = 2**13, 2**19
+"""Camera samples of a strip, at most: where paths walk, it is kept until the longest has ended; frames of fast shaders
+are done faster in large pieces."""
 _FIELD_FACES = 2**17
 """Faces at whose corners a constant environment's light is found beforehand, however small the picture."""
 
@@ -168,109 +162,65 @@ class Renderer:
         """Add passes to the film, in the order given; whether all were added.
 
         done          is told the number of each pass when it is in the film; where it returns True, no more are
-                      begun, and those under way are dropped. On KeyboardInterrupt the film keeps all whole passes
-        seconds_left  how long the caller wants to go on: passes taken together become fewer towards the end, those
-                      that were taken together are kept together, and what is under way when the time is over is
-                      dropped unless the film has no pass yet. Of passes that are dropped for their length the
-                      picture knows nothing, a bias of the order of one pass among all (Glynn & Heidelberger 1990,
-                      "Bias properties of budget constrained simulations") times the correlation of a whole
-                      pass's length and brightness
+                      begun, and those under way are dropped. On KeyboardInterrupt the film keeps the passes so far
+        seconds_left  how long the caller wants to go on: passes are begun as long as they will probably end in time,
+                      and what is under way when the time is over is dropped unless the film has no pass yet. Of
+                      passes that are dropped for their length the picture knows nothing, a bias of the order of one
+                      pass among all (Glynn & Heidelberger 1990, "Bias properties of budget constrained simulations")
+                      times the correlation of a whole pass's length and brightness
         chosen        (h, w) bool, the pixels that take part; None: all
         """
         threads = self.settings.threads or os.cpu_count() or 1
-        begun: deque[_Batch] = deque()
-        waiting = iter(passes)
-        pixels = None if chosen is None else np.flatnonzero(chosen)
-        count = self.film.hits.size if pixels is None else len(pixels)
-        stopped = threading.Event()
+        pixels = np.arange(self.film.hits.size) if chosen is None else np.flatnonzero(chosen)
+        longest = _STRIP if self._frames is None else min(len(pixels) // (2 * threads) + 1, _FRAME_STRIP)
+        strips = Strips(passes, pixels, threads, longest, seconds_left)
+        assembly, results = Assembly(len(pixels)), SimpleQueue[TracedStrip | BaseException | None]()
+        tracing = threads
         with self.stages.stage("render"), ThreadPoolExecutor(threads) as pool:
-            pace = _Pace(1 if seconds_left else max(_FIRST_SAMPLES // max(count, 1), 1))
             try:
-                while True:
-                    # enough units under way that no thread waits for the slowest unit of a pass
-                    while sum(not unit.done() for batch in begun for unit in batch.units) < 2 * threads:
-                        numbers = list(islice(waiting, self._passes_at_once(pace, count, seconds_left)))
-                        if not numbers:
-                            break
-                        begun.extend(
-                            self._begin(pool, run, threads, pixels, count, stopped) for run in _consecutive(numbers)
-                        )
-                    if not begun:
-                        return True
-                    batch = begun.popleft()
-                    try:
-                        samples = [unit.result(self._patience(seconds_left)) for unit in batch.units]
-                    except TimeoutError:
-                        return False
-                    pace.learn(len(batch.passes), max(unit.seconds for unit in samples))
-                    for k, index in enumerate(batch.passes):
-                        self._add(samples, k, index, chosen)
-                        ends = done is not None and done(index)
-                        if ends and (seconds_left is None or index == batch.passes[-1]):
+                for _ in range(threads):
+                    pool.submit(self._trace, strips, results)
+                while tracing:
+                    result = results.get(timeout=self._patience(seconds_left))
+                    if isinstance(result, BaseException):
+                        raise result
+                    if result is None:
+                        tracing -= 1
+                        continue
+                    self.tally.add(result.tally)
+                    for index, radiance, first_object in assembly.add(result):
+                        self._add(index, radiance, first_object, chosen)
+                        strips.note_added()
+                        if done is not None and done(index):
                             return False
+                return strips.exhausted
+            except Empty:
+                return False
             finally:
-                stopped.set()
-                for batch in begun:
-                    for unit in batch.units:
-                        unit.cancel()
+                strips.stop()
 
     def _patience(self, seconds_left: Callable[[], float] | None) -> float | None:
-        """How long to wait for a unit; None: until it ends."""
+        """How long to wait for a strip; None: until it ends."""
         return max(seconds_left(), 0) if seconds_left is not None and self.film.passes else None
 
-    def _passes_at_once(self, pace: _Pace, pixels: int, seconds_left: Callable[[], float] | None) -> int:
-        """How many passes of so many pixels the next unit takes."""
-        if self._fast_bodies or self._blends:
-            return 1
-        passes = pace.next_passes()
-        if seconds_left is not None:
-            passes = min(passes, pace.passes_in(seconds_left() / 4))
-        return max(min(passes, _UNIT_SAMPLES // max(pixels, 1)), 1)
-
-    def _begin(
-        self,
-        pool: ThreadPoolExecutor,
-        passes: range,
-        threads: int,
-        chosen: NDArray[np.int64] | None,
-        pixels: int,
-        stopped: threading.Event,
-    ) -> _Batch:
-        """Submit the units of some passes: whole pictures where there are many passes, else parts of one."""
-        parts = (
-            max(pixels // _UNIT_SAMPLES, min(2 * threads, pixels // _LEAST_UNIT_PIXELS), 1) if len(passes) == 1 else 1
-        )
-        bounds = np.linspace(0, pixels, parts + 1).astype(int)
-        units = [
-            pool.submit(self._trace, passes.start, int(first), int(last), len(passes), chosen, stopped)
-            for first, last in pairwise(bounds)
-        ]
-        return _Batch(passes, units)
-
-    def picture(self, seconds: float, aovs: dict[str, NDArray] | None = None) -> Picture:
-        """What is written to a file; ``seconds`` is the wall time to state in it."""
-        return Picture(self.film, seconds, self.shader_id, self.object_id, aovs or {})
-
-    def _trace(
-        self,
-        first_pass: int,
-        first: int,
-        last: int,
-        passes: int,
-        chosen: NDArray[np.int64] | None,
-        stopped: threading.Event,
-    ) -> Samples:
+    def _trace(self, strips: Strips, results: SimpleQueue[TracedStrip | BaseException | None]) -> None:
+        """Trace strips until there are no more; ends with None, or with what went wrong."""
         try:
             tracer = self._idle.get_nowait()
         except Empty:
             tracer = self._tracer()
         try:
-            start = time.perf_counter()
-            samples = tracer.trace(first_pass, first, last, passes, chosen, stopped.is_set)
-            samples.seconds = time.perf_counter() - start
-            return samples
+            for traced in tracer.trace(strips):
+                results.put(traced)
+            results.put(None)
+        except BaseException as error:
+            results.put(error)
         finally:
             self._idle.put(tracer)
+
+    def picture(self, seconds: float, aovs: dict[str, NDArray] | None = None) -> Picture:
+        """What is written to a file; ``seconds`` is the wall time to state in it."""
+        return Picture(self.film, seconds, self.shader_id, self.object_id, aovs or {})
 
     def _tracer(self) -> Wavefront | direct.DirectTracer:
         if self._frames is not None:
@@ -284,11 +234,10 @@ class Renderer:
             blends=self._blends,
         )
 
-    def _add(self, units: list[Samples], k: int, index: int, chosen: NDArray[np.bool_] | None) -> None:
-        """Add the k-th pass of the units, samples of the ``chosen`` pixels, to the film, as pass ``index``."""
-        parts = [unit.of_pass(k) for unit in units]
-        radiance = np.concatenate([part for part, _ in parts], axis=1).T
-        first = np.concatenate([part for _, part in parts])
+    def _add(
+        self, index: int, radiance: NDArray[np.float32], first: NDArray[np.int16], chosen: NDArray[np.bool_] | None
+    ) -> None:
+        """Add pass ``index``, samples of the ``chosen`` pixels, to the film."""
         if chosen is None:
             radiance, first = radiance.reshape(self.film.sum.shape), first.reshape(self.film.hits.shape)
         else:
@@ -301,9 +250,6 @@ class Renderer:
         fast = np.array([*(thing.index in biased for thing in self.traced.objects), False])
         self.film.add_pass(index, radiance, translucent[first], fast[first], chosen)
         self.added += 1
-        if k == 0:
-            for unit in units:
-                self.tally.add(unit.tally)
         self.tally.non_finite = self.film.non_finite
 
     def _identify(self) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
@@ -315,45 +261,6 @@ class Renderer:
         thing = np.where(triangle >= 0, self.traced.triangle_object[triangle], -1).astype(np.int32)
         shaders = np.array([*(SHADER_ID.get(plan.shader, -1) for plan in self.plans), -1], np.int32)
         return shaders[thing].reshape(height, width), thing.reshape(height, width)
-
-
-@dataclass(frozen=True)
-class _Batch:
-    """Passes under way: the units of all of them are the parts of the picture."""
-
-    passes: range
-    units: list[Future[Samples]]
-
-
-class _Pace:
-    """How many passes to take at once: more and more, while units are short.
-
-    Four times the passes take far less than four times as long while the last paths of a unit walk alone.
-    """
-
-    def __init__(self, first: int):
-        self._passes, self._latest, self._seconds = first, first, 0.0
-
-    def learn(self, passes: int, seconds: float) -> None:
-        """A unit of so many passes took so long."""
-        self._passes, self._latest, self._seconds = max(passes, self._passes), passes, seconds
-
-    def next_passes(self) -> int:
-        """Of the next unit."""
-        return self._passes * (4 if 0 < self._seconds < _UNIT_SECONDS else 1)
-
-    def passes_in(self, seconds: float) -> int:
-        """How many fit into a time for sure."""
-        return int(self._latest * seconds / self._seconds) if self._seconds else 1
-
-
-def _consecutive(numbers: list[int]) -> Iterator[range]:
-    """The numbers as ranges without gaps."""
-    start = 0
-    for k in range(1, len(numbers) + 1):
-        if k == len(numbers) or numbers[k] != numbers[k - 1] + 1:
-            yield range(numbers[start], numbers[k - 1] + 1)
-            start = k
 
 
 def planned(

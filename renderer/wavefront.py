@@ -1,21 +1,22 @@
 """The tracer's loop: emit, fly, meet surfaces, walk in media, refill.
 
-All camera samples of a work unit share a fixed number of paths in flight; as paths end, new ones are emitted.
-What a sample's paths do depends on their own streams alone, so results do not depend on units or threads.
+As paths end, new ones are emitted, those of the next pass where one has been begun whole: blocks stay full, and
+long paths never walk alone. What a sample's paths do depends on their own streams alone, so results do not depend on
+blocks or threads.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Mapping
 from functools import partial
 from operator import itemgetter
 
 import numpy as np
 from numpy.typing import NDArray
 
+from .columns import Columns
 from .optics.multiple_importance import power_heuristic
-from .scene.beams import beams
+from .scene.beams import Beam, beams
 from .scene.camera import CameraRays
 from .scene.lights import RectangleSource, SphereSource
 from .shaders.blend import Blend, Choices
@@ -23,6 +24,7 @@ from .shaders.boundary import meet_boundary, split
 from .shaders.fast_body import FastBody
 from .shaders.opaque import meet_diffuse, meet_mirror
 from .shaders.path import MediumWalk
+from .strips import NOTHING, Strips, TracedStrip
 from .tracing.acceleration import Acceleration
 from .tracing.paths import Paths
 from .tracing.roulette import play_at_surfaces
@@ -37,34 +39,6 @@ threads wait for each other. In a grey medium two threads bring 1.5 times the sp
 with these; in dense ones, whose jumps work on small groups, 1.0 and 1.2 (``benchmarks/walks.py``)."""
 
 _REFILL_AT = 1 / 2
-NOTHING = np.int16(-1)
-
-
-@dataclass
-class Samples:
-    """Camera samples of one work unit: pass after pass, pixel after pixel.
-
-    radiance      (3, passes * pixels) float32
-    first_object  (passes * pixels,) int16 object that the sample met first, -1 for none
-    passes        how many
-    seconds       wall time it took
-    """
-
-    radiance: Float32
-    first_object: NDArray[np.int16]
-    passes: int = 1
-    tally: Tally = field(default_factory=Tally)
-    seconds: float = 0.0
-
-    def of_pass(self, k: int) -> tuple[Float32, NDArray[np.int16]]:
-        """Radiance and first object of the k-th pass."""
-        pixels = len(self.first_object) // self.passes
-        mine = slice(k * pixels, (k + 1) * pixels)
-        return self.radiance[:, mine], self.first_object[mine]
-
-
-class Stopped(Exception):
-    """The samples are no longer wanted."""
 
 
 class Wavefront:
@@ -73,6 +47,8 @@ class Wavefront:
     fast_bodies   the objects that a shader other than path lights, by object index
     acceleration  what makes walks shorter or cheaper and leaves their mean alone
     blends        the objects that several shaders light, by object index
+
+    With fast bodies or blends, which are lit by other beams in each pass, passes do not overlap.
 
     A path is in one of several places: flying outside, standing on a surface, or in one of the media. Each step
     takes all paths of the fullest place one event further.
@@ -98,87 +74,98 @@ class Wavefront:
             MediumWalk(scene, slot, block, self._uniforms, self._tally, chosen) for slot in range(scene.media.count)
         ]
         self._fast_bodies, self._blends = fast_bodies, blends or {}
+        self._beams_of_pass = bool(self._fast_bodies or self._blends)
+        self._columns, self._beams = Columns(block), list[Beam]()
+        self._emitted = self._noted = self._steps = 0
         # how each object answers a ray, for scenes with more than one kind of surface
         self._kind = [thing.shader for thing in scene.objects]
 
-    def trace(
-        self,
-        first_pass: int,
-        first_pixel: int,
-        last_pixel: int,
-        passes: int = 1,
-        chosen: NDArray[np.int64] | None = None,
-        stopped: Callable[[], bool] | None = None,
-    ) -> Samples:
-        """Samples of the pixels in [first_pixel, last_pixel), counted along the rows, in ``passes`` passes.
+    def trace(self, strips: Strips) -> Iterator[TracedStrip]:
+        """Trace strips until there are no more, or they are stopped; each is given back when its last path has
+        ended."""
+        self._begin(strips.longest)
+        # every path outside may still split in two
+        branches = 2 if self._walks else 1
+        while not strips.stopped:
+            outside, inside = self._flying.count + self._standing.count, sum(walk.paths.count for walk in self._walks)
+            taken = branches * outside + inside
+            steps, age = self._columns.oldest(self._steps)
+            room = min(max(strips.room(self._emitted - outside - inside, age), branches), self._flying.capacity)
+            if taken <= room * _REFILL_AT:
+                yield from self._ended()
+                ended, self._noted = self._emitted - outside - inside - self._noted, self._emitted - outside - inside
+                strips.note(ended, steps)
+                self._emit(strips, (room - taken) // branches)
+            if inside or self._flying.count or self._standing.count:
+                self._step()
+            elif strips.over and self._columns.emitting is None:
+                yield from self._ended()
+                return
+            else:
+                strips.wait()
+        self._tally.take()
 
-        chosen   pixels to sample; where given, the range is of its entries
-        stopped  asked every step; Stopped is raised where it returns True
-
-        Pass after pass, pixel after pixel. Fast bodies are lit by other beams in each pass: with them in the scene
-        there must be one pass.
-        """
-        beams_of_pass = bool(self._fast_bodies or self._blends)
-        if passes > 1 and beams_of_pass:
-            raise ValueError("fast shaders take one pass at a time")
-        self._first_pass, self._first_pixel, self._pixels = first_pass, first_pixel, last_pixel - first_pixel
-        self._chosen = chosen
-        count = passes * self._pixels
-        # the second half is for the branches of paths that split
-        self._radiance = np.zeros((3, 2 * count), np.float32)
-        self._samples = count
-        self._first_object = np.full(count, NOTHING)
-        self._first_unknown = np.ones(count, bool)
-        self._beams = beams(self.scene.lights, first_pass) if beams_of_pass else []
-        self._choices = Choices(self._blends, self._streams(np.arange(count))) if self._blends else None
+    def _begin(self, longest: int) -> None:
+        """Forget all paths and make room for strips of at most so many samples."""
+        if not self._columns.fit(longest):
+            self._columns = Columns(longest)
+        self._columns.clear()
+        self._choices = Choices(self._blends, self._columns.count) if self._blends else None
+        self._emitted = self._noted = self._steps = 0
+        self._turn = -1
         for place in (self._flying, self._standing):
             place.clear()
         for walk in self._walks:
             walk.paths.clear()
-        emitted = 0
-        while True:
-            # every path outside may still split in two
-            branches = 2 if self._walks else 1
-            taken = branches * (self._flying.count + self._standing.count) + sum(
-                walk.paths.count for walk in self._walks
-            )
-            if emitted < count and taken <= self._flying.capacity * _REFILL_AT:
-                new = min((self._flying.capacity - taken) // branches, count - emitted)
-                self._emit(emitted, new)
-                emitted += new
-            elif taken == 0:
-                break
-            elif stopped is not None and stopped():
-                self._tally.take()
-                raise Stopped
-            self._step()
-        radiance = self._radiance[:, :count] + self._radiance[:, count:]
-        result = Samples(radiance, self._first_object, passes, self._tally.take())
-        result.tally.samples = count
-        return result
 
-    def _emit(self, first_sample: int, count: int) -> None:
-        samples = np.arange(first_sample, first_sample + count)
-        streams = self._streams(samples)
-        jitter = np.stack(self._uniforms.draw(streams))
-        direction = self.camera.directions(self._pixel(samples), jitter)
-        self._flying.emit(self.camera.origin[:, None], direction, streams, samples)
+    def _emit(self, strips: Strips, room: int) -> None:
+        """Emit the next camera samples, at most so many."""
+        parts = []
+        while room and self._turn_to_next(strips):
+            parts.append(self._columns.emit(room))
+            room -= len(parts[-1].columns)
+        if not parts:
+            return
+        columns, pixels, passes = (np.concatenate(part) for part in zip(*parts, strict=True))
+        streams = stream_keys(self.seed, passes, pixels)
+        if self._choices is not None:
+            self._choices.choose(columns, streams)
+        direction = self.camera.directions(pixels, np.stack(self._uniforms.draw(streams)))
+        self._flying.emit(self.camera.origin[:, None], direction, streams, columns)
+        self._emitted += len(columns)
 
-    def _pixel(self, samples: NDArray[np.int64]) -> NDArray[np.int64]:
-        pixels = samples % max(self._pixels, 1) + self._first_pixel
-        return pixels if self._chosen is None else self._chosen[pixels]
+    def _turn_to_next(self, strips: Strips) -> bool:
+        """Whether there is a strip whose samples can be emitted now."""
+        columns = self._columns
+        if columns.emitting is None:
+            strip = None if columns.full else strips.take()
+            if strip is None:
+                return False
+            columns.put(strip, self._steps)
+        strip = columns.emitting
+        assert strip is not None
+        if self._beams_of_pass and strip.turn != self._turn:
+            if columns.strips > 1:
+                return False
+            self._turn, self._beams = strip.turn, beams(self.scene.lights, strip.pass_index)
+        return True
 
-    def _streams(self, samples: NDArray[np.int64]) -> NDArray[np.uint64]:
-        passes = samples // max(self._pixels, 1) + self._first_pass
-        return stream_keys(self.seed, passes, self._pixel(samples))
+    def _ended(self) -> Iterator[TracedStrip]:
+        """The strips whose paths have all ended."""
+        places = (self._flying, self._standing, *(walk.paths for walk in self._walks))
+        for strip, radiance, first_object in self._columns.ended(paths.sample for paths in places):
+            tally = self._tally.take()
+            tally.samples = len(first_object)
+            yield TracedStrip(strip, radiance, first_object, tally)
 
     def _step(self) -> None:
         """Take the paths of the fullest place one event further."""
         places = [(self._flying.count, self._fly), (self._standing.count, self._stand)]
         for walk in self._walks:
-            places.append((walk.paths.count, partial(walk.step, self._standing, self._radiance)))
+            places.append((walk.paths.count, partial(walk.step, self._standing, self._columns.radiance)))
         _, step = max(places, key=itemgetter(0))
         step()
+        self._steps += 1
 
     def _fly(self) -> None:
         """Take the paths outside all media to the surfaces they meet; add the background that the others see."""
@@ -189,7 +176,7 @@ class Wavefront:
         lights = self.scene.lights
         density = paths.density[escaped] if lights.skies else None
         background = lights.background(paths.direction[:, escaped], density)
-        self._radiance[:, paths.sample[escaped]] += paths.throughput[:, escaped] * background
+        self._columns.radiance[:, paths.sample[escaped]] += paths.throughput[:, escaped] * background
         np.copyto(distance, 0, where=triangle == -1)
         paths.origin += paths.direction * distance
         if lights.sampled:
@@ -214,7 +201,7 @@ class Wavefront:
     def _meet(self) -> None:
         """What each surface does to the paths that stand on it."""
         paths, scene = self._standing, self.scene
-        split(scene, paths, self._samples, self._choices)
+        split(scene, paths, self._columns.count, self._choices)
         index, triangle = np.arange(paths.count), paths.triangle.copy()
         spheres = triangle < 0
         if spheres.any():
@@ -230,7 +217,7 @@ class Wavefront:
             if not len(who):
                 continue
             if kind == "opaque":
-                meet_diffuse(scene, paths, who, faces, self._uniforms, self._tally, self._radiance)
+                meet_diffuse(scene, paths, who, faces, self._uniforms, self._tally, self._columns.radiance)
             elif kind == "mirror":
                 meet_mirror(scene, paths, who, faces)
             elif k in self._blends:
@@ -250,7 +237,7 @@ class Wavefront:
         if not len(who):
             return
         arguments = (self.scene, self._standing, who, faces)
-        counts = (self._uniforms, self._tally, self._radiance)
+        counts = (self._uniforms, self._tally, self._columns.radiance)
         if body is None:
             meet_boundary(*arguments, *counts)
         else:
@@ -259,10 +246,10 @@ class Wavefront:
     def _note_first(self, index: NDArray[np.intp], thing: NDArray[np.int16]) -> None:
         # of a split path one branch is enough
         sample = self._standing.sample[index]
-        first = np.flatnonzero(sample < self._samples)
-        first = first[self._first_unknown[sample[first]]]
-        self._first_object[sample[first]] = thing[first]
-        self._first_unknown[sample[first]] = False
+        first = np.flatnonzero(sample < self._columns.count)
+        first = first[self._columns.first_unknown[sample[first]]]
+        self._columns.first_object[sample[first]] = thing[first]
+        self._columns.first_unknown[sample[first]] = False
 
     def _meet_rectangles(self, index: NDArray[np.intp], triangle: NDArray[np.int32]) -> None:
         """Add the radiance of rectangle lights seen from the front; they end every path."""
@@ -290,4 +277,4 @@ class Wavefront:
             who = index[drawn]
             vertex = paths.origin[:, who] - paths.flown[who] * paths.direction[:, who]
             share[drawn] = power_heuristic(paths.density[who], light.density(vertex))
-        self._radiance[:, paths.sample[index]] += paths.throughput[:, index] * light.radiance * share
+        self._columns.radiance[:, paths.sample[index]] += paths.throughput[:, index] * light.radiance * share

@@ -41,18 +41,22 @@ class Blend:
 
 
 class Choices:
-    """What each of some camera samples chooses, for every object lit by several shaders.
+    """What each of ``count`` camera samples chooses, for every object lit by several shaders.
 
     Samples beyond the last are the branches of those that came before.
     """
 
-    def __init__(self, blends: Mapping[int, Blend], streams: NDArray[np.uint64]):
-        self._count = len(streams)
-        self._chosen = {index: blend.choose(streams) for index, blend in blends.items()}
-        self._fast = {
-            index: np.array([body is not None for body in blend.bodies])[self._chosen[index]]
-            for index, blend in blends.items()
-        }
+    def __init__(self, blends: Mapping[int, Blend], count: int):
+        self._count, self._blends = count, blends
+        self._chosen = {index: np.zeros(count, np.int8) for index in blends}
+        self._fast = {index: np.zeros(count, bool) for index in blends}
+
+    def choose(self, samples: NDArray[np.int64], streams: NDArray[np.uint64]) -> None:
+        """Choose for the camera samples ``samples`` (n,), with the streams (n,)."""
+        for index, blend in self._blends.items():
+            chosen = blend.choose(streams)
+            self._chosen[index][samples] = chosen
+            self._fast[index][samples] = np.array([body is not None for body in blend.bodies])[chosen]
 
     def of(self, index: int, sample: NDArray[np.int32]) -> NDArray[np.int8]:
         """(n,) which shader lights the object ``index`` for ``sample`` (n,)."""

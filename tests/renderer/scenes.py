@@ -19,15 +19,13 @@ from renderer.scene.description import (
     SceneObject,
     Translucent,
 )
+from renderer.strips import Assembly, Strips
 from renderer.tracing.tally import Tally
 from renderer.tracing.traced_scene import TracedScene
 from renderer.wavefront import BLOCK, Wavefront
 from sss_tools.medium import Medium
 from sss_tools.mesh import Mesh
 from sss_tools.shapes import icosphere
-
-TOGETHER = 2**18
-"""Camera samples that are traced at once."""
 
 WHITE_SKY = EnvironmentLight(radiance=np.ones(3))
 
@@ -105,15 +103,29 @@ def wavefront(
     return Wavefront(traced, CameraRays(of.camera, traced.frame), {}, seed, block, acceleration)
 
 
+@dataclass
+class Samples:
+    """What a tracer made of some passes: radiance (passes, 3, pixels), first_object (passes, pixels)."""
+
+    radiance: NDArray[np.float32]
+    first_object: NDArray[np.int16]
+    tally: Tally
+
+
+def traced(tracer, pixels, first_pass: int = 0, passes: int = 1, longest: int = 2**13) -> Samples:
+    """All samples of ``pixels``, a number of them or (n,) which, in some passes."""
+    pixels = np.arange(pixels) if isinstance(pixels, int) else pixels
+    assembly, tally, done = Assembly(len(pixels)), Tally(), []
+    for strip in tracer.trace(Strips(range(first_pass, first_pass + passes), pixels, 1, longest)):
+        tally.add(strip.tally)
+        done += assembly.add(strip)
+    assert [index for index, _, _ in done] == list(range(first_pass, first_pass + passes))
+    radiance, first_object = np.stack([each.T for _, each, _ in done]), np.stack([first for _, _, first in done])
+    return Samples(radiance, first_object, tally)
+
+
 def picture(of: Scene, passes: int, **how) -> Picture:
     """Render with ``wavefront(of, **how)``."""
     width, height = of.camera.resolution
-    tracer, tally, parts = wavefront(of, **how), Tally(), []
-    # many passes at once keep blocks full
-    together = max(TOGETHER // (width * height), 1)
-    for first in range(0, passes, together):
-        parts.append(tracer.trace(first, 0, width * height, min(together, passes - first)))
-        tally.add(parts[-1].tally)
-    passes_of_parts = [part.of_pass(k) for part in parts for k in range(part.passes)]
-    samples = np.stack([radiance for radiance, _ in passes_of_parts]).astype(float)
-    return Picture(samples, np.stack([first for _, first in passes_of_parts]), tally)
+    made = traced(wavefront(of, **how), width * height, 0, passes)
+    return Picture(made.radiance.astype(float), made.first_object, made.tally)

@@ -13,7 +13,17 @@ from renderer.tracing.acceleration import Acceleration
 from renderer.tracing.distance_grid import DistanceGrid
 from sss_tools.shapes import box, icosphere
 from tests.assertions import assert_mean, seed
-from tests.renderer.scenes import WHITE_SKY, camera, half_white_sky, picture, placed, scene, translucent, wavefront
+from tests.renderer.scenes import (
+    WHITE_SKY,
+    camera,
+    half_white_sky,
+    picture,
+    placed,
+    scene,
+    traced,
+    translucent,
+    wavefront,
+)
 
 SIGMA_T = 25.0
 VIEW = camera((0, 0, 5), fov=20, resolution=(40, 40))  # shows nothing but the ball
@@ -27,9 +37,9 @@ def dense(albedo=(0.99, 0.97, 0.93), sigma_t=SIGMA_T, g=0.0, ior=1.4):
 
 def means(of, number: int, acceleration=None, passes: int = PASSES):
     """(passes,) means over the picture of the first and last channel, and what was counted."""
-    traced = wavefront(of, seed=seed(number), acceleration=acceleration).trace(0, 0, 1600, passes)
-    radiance = traced.radiance.astype(float).reshape(3, passes, -1).mean(axis=2)
-    return radiance[0], radiance[2], traced.tally
+    made = traced(wavefront(of, seed=seed(number), acceleration=acceleration), 1600, 0, passes)
+    radiance = made.radiance.astype(float).mean(axis=2)
+    return radiance[:, 0], radiance[:, 2], made.tally
 
 
 def options(of) -> dict[str, Acceleration]:

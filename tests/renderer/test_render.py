@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from renderer import render
+from renderer import render, strips
 from renderer.render import Renderer, Settings, planned_hash
 from renderer.scene.description import DirectionalLight
 from sss_tools import shapes
@@ -34,14 +34,14 @@ def same_bits(one, two) -> bool:
 
 
 @pytest.mark.parametrize("shader", ["path", "plumb", "scalar"])
-def test_threads_and_the_size_of_work_units_do_not_show(monkeypatch, shader):
+def test_threads_and_the_size_of_strips_do_not_show(monkeypatch, shader):
     """Parts of passes as well as many passes at once."""
     whole = filmed(small_scene(), range(9), shader=shader, threads=1)
-    for threads, samples, pixels, seconds in ((2, 2**18, 8192, 1), (1, 100, 10, 1), (2, 100, 50, 0), (5, 10**6, 37, 9)):
-        monkeypatch.setattr(render, "_UNIT_SAMPLES", samples)
-        monkeypatch.setattr(render, "_LEAST_UNIT_PIXELS", pixels)
-        monkeypatch.setattr(render, "_UNIT_SECONDS", seconds)
-        assert same_bits(whole, filmed(small_scene(), range(9), shader=shader, threads=threads)), samples
+    for threads, longest, room in ((2, 2**13, 1), (1, 100, 1000), (2, 37, 50), (5, 1000, 10**5)):
+        monkeypatch.setattr(render, "_STRIP", longest)
+        monkeypatch.setattr(render, "_FRAME_STRIP", longest)
+        monkeypatch.setattr(strips, "_FIRST_ROOM", room)
+        assert same_bits(whole, filmed(small_scene(), range(9), shader=shader, threads=threads)), longest
 
 
 def test_passes_are_the_same_in_one_run_and_in_many():

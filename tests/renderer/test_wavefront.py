@@ -11,6 +11,7 @@ from renderer.scene.description import (
     RectangleLight,
     SphereLight,
 )
+from renderer.strips import Strips
 from renderer.tracing import roulette
 from sss_tools.shapes import box, icosphere, moved
 from tests.assertions import assert_mean, seed
@@ -23,6 +24,7 @@ from tests.renderer.scenes import (
     picture,
     placed,
     scene,
+    traced,
     translucent,
     wavefront,
 )
@@ -64,13 +66,13 @@ SCENES = {"chromatic": [3.0, 5.0, 9.0], "achromatic": 5.0}
 def rendered(request):
     """A scene, and pass 3 of it in one piece."""
     described = everything(SCENES[request.param])
-    return described, wavefront(described, seed=5).trace(3, 0, PIXELS)
+    return described, traced(wavefront(described, seed=5), PIXELS, 3)
 
 
 @pytest.mark.parametrize("block", [1, 7, 1024, 20000])
 def test_picture_is_the_same_bit_for_bit_in_blocks_of_any_size(rendered, block):
     described, whole = rendered
-    other = wavefront(described, seed=5, block=block).trace(3, 0, PIXELS)
+    other = traced(wavefront(described, seed=5, block=block), PIXELS, 3)
     assert_array_equal(other.radiance, whole.radiance)
     assert_array_equal(other.first_object, whole.first_object)
     assert other.tally == whole.tally
@@ -81,25 +83,25 @@ def test_picture_is_the_same_bit_for_bit_in_any_pieces(rendered, size):
     """Backwards, from one tracer that has traced other things before."""
     described, whole = rendered
     tracer = wavefront(described, seed=5)
-    tracer.trace(0, 0, 50)
+    traced(tracer, 50)
     starts = range(0, PIXELS, size)
-    pieces = {start: tracer.trace(3, start, min(start + size, PIXELS)) for start in reversed(starts)}
-    assert_array_equal(np.concatenate([pieces[start].radiance for start in starts], axis=1), whole.radiance)
-    assert_array_equal(np.concatenate([pieces[start].first_object for start in starts]), whole.first_object)
+    pieces = {start: traced(tracer, np.arange(start, min(start + size, PIXELS)), 3) for start in reversed(starts)}
+    assert_array_equal(np.concatenate([pieces[start].radiance for start in starts], axis=2), whole.radiance)
+    assert_array_equal(np.concatenate([pieces[start].first_object for start in starts], axis=1), whole.first_object)
     assert sum(piece.tally.collisions for piece in pieces.values()) == whole.tally.collisions
 
 
 def test_same_call_gives_the_same_picture(rendered):
     described, whole = rendered
-    assert_array_equal(wavefront(described, seed=5).trace(3, 0, PIXELS).radiance, whole.radiance)
+    assert_array_equal(traced(wavefront(described, seed=5), PIXELS, 3).radiance, whole.radiance)
 
 
 @pytest.mark.parametrize("change", [{"seed": 6}, {"pass": 4}])
 def test_other_seeds_and_passes_give_other_samples(rendered, change):
     described, whole = rendered
-    other = wavefront(described, seed=change.get("seed", 5)).trace(change.get("pass", 3), 0, PIXELS)
+    other = traced(wavefront(described, seed=change.get("seed", 5)), PIXELS, change.get("pass", 3))
     hit = whole.first_object >= 0
-    assert (other.radiance != whole.radiance)[:, hit].any(axis=0).mean() > 0.95
+    assert (other.radiance != whole.radiance).any(axis=1)[hit].mean() > 0.95
 
 
 def test_every_sample_is_finite_and_counted(rendered):
@@ -114,9 +116,9 @@ def test_every_sample_is_finite_and_counted(rendered):
 def test_tally_starts_afresh_with_each_call():
     described = everything(5.0)
     tracer = wavefront(described)
-    first, second = tracer.trace(0, 0, 200), tracer.trace(0, 0, 200)
+    first, second = traced(tracer, 200), traced(tracer, 200)
     assert first.tally == second.tally
-    assert tracer.trace(0, 0, 0).tally.samples == 0
+    assert traced(tracer, 0).tally.samples == 0
 
 
 def test_nothing_is_seen_of_objects_outside_the_view():
@@ -126,17 +128,31 @@ def test_nothing_is_seen_of_objects_outside_the_view():
     assert_array_equal(shown.samples, np.ones((1, 3, 64)))
 
 
-@pytest.mark.parametrize("passes", [2, 5])
-def test_passes_taken_together_are_the_passes_taken_one_by_one(rendered, passes):
+@pytest.mark.parametrize(("passes", "longest", "block"), [(2, 300, 1024), (5, 70, 50), (5, 1000, 20000)])
+def test_passes_that_overlap_are_the_passes_taken_one_by_one(rendered, passes, longest, block):
     described, whole = rendered
-    together = wavefront(described, seed=5).trace(3, 100, 400, passes)
+    pixels = np.arange(100, 400)
+    together = traced(wavefront(described, seed=5, block=block), pixels, 3, passes, longest)
     assert together.tally.samples == passes * 300
     for k in range(passes):
-        alone = wavefront(described, seed=5).trace(3 + k, 100, 400)
-        radiance, first_object = together.of_pass(k)
-        assert_array_equal(radiance, alone.radiance)
-        assert_array_equal(first_object, alone.first_object)
-    assert_array_equal(together.of_pass(0)[0], whole.radiance[:, 100:400])
+        alone = traced(wavefront(described, seed=5), pixels, 3 + k)
+        assert_array_equal(together.radiance[k], alone.radiance[0])
+        assert_array_equal(together.first_object[k], alone.first_object[0])
+    assert_array_equal(together.radiance[0], whole.radiance[0, :, 100:400])
+
+
+def test_passes_do_overlap():
+    """The last paths of a pass do not walk alone: the next is begun before."""
+    begun, added = [], []
+
+    class Noted(Strips):
+        def take(self):
+            begun.append(len(added))
+            return super().take()
+
+    for strip in wavefront(everything(5.0), block=PIXELS).trace(Noted(range(4), np.arange(PIXELS), 1, 100)):
+        added.append(strip.strip.pass_index)
+    assert begun[PIXELS // 100 + 1] < PIXELS // 100  # of the second pass, while strips of the first were under way
 
 
 # ---- roulette ----

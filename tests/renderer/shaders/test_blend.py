@@ -51,8 +51,10 @@ def test_shares_are_met_and_objects_choose_apart():
 
 
 def test_branches_choose_as_their_path_did():
-    choices = Choices({0: Blend(0, (None, None), (0.5, 0.5))}, KEYS[:50])
+    choices = Choices({0: Blend(0, (None, None), (0.5, 0.5))}, 50)
     samples = np.arange(50, dtype=np.int32)
+    choices.choose(samples, KEYS[:50])
+    assert 0 < choices.of(0, samples).sum() < 50
     assert_array_equal(choices.of(0, samples), choices.of(0, samples + 50))
 
 

@@ -17,7 +17,7 @@ from renderer.wavefront import Wavefront
 from sss_tools.mesh import Mesh
 from sss_tools.shapes import box, icosphere, moved
 from tests.assertions import assert_mean, seed, shared_rate
-from tests.renderer.scenes import camera, diffuse, placed, scene, translucent, wavefront
+from tests.renderer.scenes import camera, diffuse, placed, scene, traced, translucent, wavefront
 
 FALSE_ALARM = 1e-3
 VIEW = camera((0, 0, 5), fov=20, resolution=(40, 40))
@@ -98,8 +98,8 @@ def samples(case: Case, number: int) -> np.ndarray:
     chosen = None
     if case.guided:
         chosen = Acceleration(None, (None,), (Guide.of(0.9, float(wavefront(of).scene.media.sigma_t[0, 0])),))
-    traced = wavefront(of, seed=seed(number), acceleration=chosen).trace(0, 0, 1600, case.passes)
-    return traced.radiance[0].astype(float).reshape(case.passes, -1)
+    made = traced(wavefront(of, seed=seed(number), acceleration=chosen), 1600, 0, case.passes)
+    return made.radiance[:, 0].astype(float)
 
 
 def by_chance_alone(patch: pytest.MonkeyPatch) -> None:
@@ -220,7 +220,7 @@ def test_even_skies_cost_no_samples():
     for sky in (EnvironmentLight(radiance=np.ones(3)), WHITE_IMAGE):
         tracer = wavefront(ball_in(sky, ior=1.0))
         assert not tracer.scene.lights.sampled
-        taken = tracer.trace(0, 0, 1600)
+        taken = traced(tracer, 1600)
         # no ray but the walk's own
         assert taken.tally.rays <= 3 * 1600 + taken.tally.collisions
     assert wavefront(ball_in(uneven_sky(), ior=1.0)).scene.lights.sampled
@@ -233,7 +233,7 @@ def test_highlights_of_fast_shaders_keep_their_mean():
         of = ball_in(ROOF, sigma_t=10.0, roughness=0.4)
         renderer = Renderer(of, Settings(shader="plumb", threads=1))
         tracer = Wavefront(renderer.traced, renderer.camera, renderer._fast_bodies, seed(number))
-        return np.stack([tracer.trace(k, 0, 1600).radiance[0] for k in range(40)]).astype(float)
+        return traced(tracer, 1600, 0, 40).radiance[:, 0].astype(float)
 
     both = film(7)
     with pytest.MonkeyPatch.context() as patch:
