@@ -54,25 +54,19 @@ def _peak_memory() -> int:
 
 
 def ours(options: argparse.Namespace) -> dict:
-    """The path shader, all passes in one run as the command does it, at least ``LEAST`` of them."""
+    """The path shader, as many passes as the command makes in the time, at least ``LEAST`` of them."""
     started = process_start()
     from renderer.render import Renderer, Settings
     from renderer.scene.scene_file import load_scene
 
     renderer = Renderer(load_scene(options.scene), Settings(shader="path", seed=options.seed))
     begun, cpu = time.monotonic(), time.process_time()
-    ended = begun
-
-    def done(_: int) -> bool:
-        nonlocal ended
-        ended = time.monotonic()
-        return ended - begun > options.seconds and renderer.film.passes >= LEAST
-
-    def seconds_left() -> float:
-        # as for --time: fewer passes at once towards the end, for what is under way then is lost
-        return begun + options.seconds - time.monotonic()
-
-    renderer.run(count(), done, seconds_left)
+    # as for --time
+    renderer.run(count(), None, lambda: begun + options.seconds - time.monotonic())
+    if renderer.film.passes < LEAST:
+        more = count(max(stop for _, stop in renderer.film.ranges))
+        renderer.run(more, lambda _: renderer.film.passes >= LEAST)
+    ended = time.monotonic()
     film = renderer.film
     return {
         "mean": film.mean(),

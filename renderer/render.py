@@ -164,10 +164,9 @@ class Renderer:
         done          is told the number of each pass when it is in the film; where it returns True, no more are
                       begun, and those under way are dropped. On KeyboardInterrupt the film keeps the passes so far
         seconds_left  how long the caller wants to go on: passes are begun as long as they will probably end in time,
-                      and what is under way when the time is over is dropped unless the film has no pass yet. Of
-                      passes that are dropped for their length the picture knows nothing, a bias of the order of one
-                      pass among all (Glynn & Heidelberger 1990, "Bias properties of budget constrained simulations")
-                      times the correlation of a whole pass's length and brightness
+                      and those that are not whole when the time is over are dropped, unless there would be none.
+                      So the picture misses what the longest paths carry: if a share d of the passes of n pixels is
+                      dropped, the longest d/n of the paths or less, a bias of that order relative to the mean
         chosen        (h, w) bool, the pixels that take part; None: all
         """
         threads = self.settings.threads or os.cpu_count() or 1
@@ -181,7 +180,8 @@ class Renderer:
                 for _ in range(threads):
                     pool.submit(self._trace, strips, results)
                 while tracing:
-                    result = results.get(timeout=self._patience(seconds_left))
+                    enough = self.film.passes or assembly.any_whole
+                    result = results.get(timeout=max(seconds_left(), 0) if seconds_left and enough else None)
                     if isinstance(result, BaseException):
                         raise result
                     if result is None:
@@ -195,13 +195,11 @@ class Renderer:
                             return False
                 return strips.exhausted
             except Empty:
+                for index, radiance, first_object in assembly.rest():
+                    self._add(index, radiance, first_object, chosen)
                 return False
             finally:
                 strips.stop()
-
-    def _patience(self, seconds_left: Callable[[], float] | None) -> float | None:
-        """How long to wait for a strip; None: until it ends."""
-        return max(seconds_left(), 0) if seconds_left is not None and self.film.passes else None
 
     def _trace(self, strips: Strips, results: SimpleQueue[TracedStrip | BaseException | None]) -> None:
         """Trace strips until there are no more; ends with None, or with what went wrong."""

@@ -26,7 +26,7 @@ _FIRST_ROOM = 2**13
 the first passes come soon."""
 _LONG = 1.5
 """Times that paths in flight have still to go as far as the mean path, to be on the safe side."""
-_LONGEST, _STEP_SECONDS = 3.0, 5e-4
+_LONGEST, _STEP_SECONDS = 2.0, 5e-4
 """Times that the longest path to come is longer than all before, and what a step takes when few paths are left."""
 _PATIENCE, _PATIENT_SHARE = 1.0, 0.5
 """Seconds, and share of the run so far, that the oldest path may take before fewer keep it company."""
@@ -173,8 +173,21 @@ class Assembly:
         self._passes.setdefault(turn, []).append(traced)
         self._missing[turn] = self._missing.get(turn, self._pixels) - len(traced.strip.pixels)
         while self._missing.get(self._next) == 0:
-            del self._missing[self._next]
-            parts = sorted(self._passes.pop(self._next), key=lambda part: part.strip.first)
+            yield self._whole(self._next)
             self._next += 1
-            radiance = np.concatenate([part.radiance.T for part in parts])
-            yield parts[0].strip.pass_index, radiance, np.concatenate([part.first_object for part in parts])
+
+    @property
+    def any_whole(self) -> bool:
+        """Whether there are passes that wait only for others."""
+        return 0 in self._missing.values()
+
+    def rest(self) -> Iterator[tuple[int, Float32, NDArray[np.int16]]]:
+        """As ``add``, the other whole passes, although some before them are not."""
+        for turn in sorted(turn for turn, missing in self._missing.items() if missing == 0):
+            yield self._whole(turn)
+
+    def _whole(self, turn: int) -> tuple[int, Float32, NDArray[np.int16]]:
+        del self._missing[turn]
+        parts = sorted(self._passes.pop(turn), key=lambda part: part.strip.first)
+        radiance = np.concatenate([part.radiance.T for part in parts])
+        return parts[0].strip.pass_index, radiance, np.concatenate([part.first_object for part in parts])

@@ -42,6 +42,15 @@ def test_passes_come_whole_and_in_order_whichever_strip_ends_first():
             assert_array_equal(first_object, np.arange(50))
 
 
+def test_whole_passes_after_one_that_is_not_are_the_rest():
+    found = taken(Strips([4, 2, 9, 6], np.arange(20), 1, 10))
+    assembly = Assembly(20)
+    done = [index for k in (0, 2, 3, 4, 6, 7) for index, _, _ in assembly.add(painted(found[k]))]
+    assert done == []
+    assert [index for index, _, _ in assembly.rest()] == [2, 6]
+    assert [index for index, _, _ in assembly.add(painted(found[1]))] == [4]
+
+
 def test_a_pass_without_pixels_is_a_pass():
     (strip,) = taken(Strips([3], np.arange(0), 2, 8))
     ((index, radiance, _),) = Assembly(0).add(painted(strip))
