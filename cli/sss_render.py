@@ -20,10 +20,11 @@ from .command import ArgumentParser, complain, progress, run, unavailable, versi
 
 if TYPE_CHECKING:
     from renderer.job import Budget
-    from renderer.render import Renderer, Settings, Stages
+    from renderer.render import Renderer, Settings
     from renderer.scene.description import Scene, SceneObject
     from renderer.scene.holes import HoleReport
     from renderer.shaders.selection import Measured, Plan
+    from renderer.stages import Stages
 
 PROGRAM = "sss-render"
 _SHARE = 0.9
@@ -76,7 +77,8 @@ def _picture(options: Any, started: float) -> int:
     """Render and write."""
     from renderer.job import execute, guide_arrays, rare_event_warnings, report
     from renderer.output.image import check_writable
-    from renderer.render import Renderer, Stages
+    from renderer.render import Renderer
+    from renderer.stages import Stages
 
     check_writable(options.output)
     if options.preview is not None:
@@ -291,8 +293,9 @@ def _piloted(
 def _explain_only(options: Any) -> int:
     """Print, and report where asked for, what would be done with each object."""
     from renderer.job import plan_report
-    from renderer.render import Stages, closed_for_light, planned
+    from renderer.render import closed_for_light, planned
     from renderer.shaders.selection import picture_passes
+    from renderer.stages import Stages
 
     if options.report is not None:
         _check_report(options.report)

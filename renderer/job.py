@@ -20,7 +20,7 @@ from . import adaptive
 from .output import image, passes
 from .output.film import Film
 from .output.image import Picture
-from .render import Renderer, Stages, planned_hash
+from .render import Renderer, planned_hash
 from .scene.description import (
     DirectionalLight,
     PointLight,
@@ -32,6 +32,7 @@ from .scene.description import (
 )
 from .scene.holes import HoleReport, in_mesh_units
 from .shaders.selection import Plan
+from .stages import Stages
 
 DEFAULT_PASSES = 64
 REFRESH_EVERY, REFRESH_SHARE = 1.0, 0.05

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from hashlib import blake2b
 from queue import Empty, SimpleQueue
 
@@ -15,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import direct
+from .fast_bodies import fast_bodies
 from .output.film import Film
 from .output.image import Picture
 from .scene.admission import admit
@@ -22,17 +22,14 @@ from .scene.camera import CameraRays
 from .scene.description import Camera, Scene
 from .scene.fingerprint import scene_hash
 from .scene.holes import HoleReport, close_holes
-from .shaders import FAST_SHADERS, diffuse, plumb, selection
-from .shaders.ambient_field import corner_field
-from .shaders.blend import Blend
-from .shaders.fast_body import FastBody
+from .shaders import selection
 from .shaders.selection import DEFAULT_QUALITY, Measured, Plan
-from .shaders.surface import BodyOptics
+from .stages import Stages
 from .strips import NOTHING, Assembly, Strips, TracedStrip
 from .tracing.acceleration import Acceleration
 from .tracing.memory import keep_freed_memory
 from .tracing.tally import Tally
-from .tracing.traced_scene import TracedObject, TracedScene
+from .tracing.traced_scene import TracedScene
 from .wavefront import Wavefront
 
 SHADER_ID = {"path": 0, "plumb": 1, "scalar": 2, "diffuse": 3}
@@ -40,8 +37,6 @@ SHADER_ID = {"path": 0, "plumb": 1, "scalar": 2, "diffuse": 3}
 _STRIP, _FRAME_STRIP = 2**13, 2**19
 """Camera samples of a strip, at most: where paths walk, it is kept until the longest has ended; frames of fast shaders
 are done faster in large pieces."""
-_FIELD_FACES = 2**17
-"""Faces at whose corners a constant environment's light is found beforehand, however small the picture."""
 
 
 @dataclass(frozen=True)
@@ -61,34 +56,6 @@ class Settings:
     seed: int = 0
     threads: int | None = None
     target_error: float | None = None
-
-
-@dataclass
-class Stages:
-    """Wall seconds by stage.
-
-    parts  of the stage ``build``: what was built for which object, or for the whole scene ("")
-    """
-
-    seconds: dict[str, float] = field(default_factory=dict)
-    parts: dict[str, dict[str, float]] = field(default_factory=dict)
-
-    @contextmanager
-    def part(self, thing: str, what: str) -> Iterator[None]:
-        """Count the block's time as that of building ``what`` for the object ``thing``."""
-        start = time.perf_counter()
-        yield
-        mine = self.parts.setdefault(thing, {})
-        mine[what] = mine.get(what, 0.0) + time.perf_counter() - start
-
-    @contextmanager
-    def stage(self, name: str) -> Iterator[None]:
-        """Count the block's time under ``name``."""
-        start = time.perf_counter()
-        try:
-            yield
-        finally:
-            self.seconds[name] = self.seconds.get(name, 0.0) + time.perf_counter() - start
 
 
 class Renderer:
@@ -128,7 +95,7 @@ class Renderer:
             self.camera = CameraRays(scene.camera, self.traced.frame)
             width, height = scene.camera.resolution
             threads = settings.threads or os.cpu_count() or 1
-            self._fast_bodies, self._blends = _bodies(self.traced, self.plans, width * height, threads, self.stages)
+            self._fast_bodies, self._blends = fast_bodies(self.traced, self.plans, width * height, threads, self.stages)
             self.acceleration = _acceleration(self.traced, width * height, self.stages)
             self._frames = None
             if not self._blends and direct.applies_to(self.traced, self._fast_bodies):
@@ -319,61 +286,3 @@ def _acceleration(traced: TracedScene, pixels: int, stages: Stages) -> Accelerat
     if acceleration.grid is not None:
         stages.parts.setdefault("", {})["distance grid and ball jumps"] = time.perf_counter() - start
     return acceleration
-
-
-def _bodies(
-    traced: TracedScene, plans: list[Plan], pixels: int, threads: int, stages: Stages
-) -> tuple[dict[int, FastBody], dict[int, Blend]]:
-    """What the faster shaders need, for the objects that use them and no others; and those that use several."""
-    even = any(environment.constant is not None for environment in traced.lights.environments)
-    media = {thing.index: thing.medium for thing in traced.objects}
-    bodies: dict[int, FastBody] = {}
-    blends: dict[int, Blend] = {}
-    for thing, plan in zip(traced.objects, plans, strict=True):
-        names = [name for name in plan.shares if name in FAST_SHADERS]
-        if not names or thing.medium is None:
-            continue
-        radius = float(np.linalg.norm(thing.upper - thing.lower)) / 2
-        others = {index: medium for index, medium in media.items() if index != thing.index}
-        optics = BodyOptics.prepare(thing.index, thing.medium, radius, others)
-        curvature = field = None
-        if names != [diffuse.NAME]:
-            with stages.part(plan.name, "curvature"):
-                curvature = _corner_curvature(traced, thing)
-            with stages.part(plan.name, "table of balls"):
-                _ = optics.tables  # now, and not in every thread at once
-        # else frames themselves are sooner done
-        if curvature is not None and plumb.NAME in names and even and len(curvature) <= max(pixels, _FIELD_FACES):
-            with stages.part(plan.name, "light of the sky at corners"):
-                field = _ambient_field(traced, thing, optics, curvature, threads)
-        made = {
-            name: FastBody(
-                thing,
-                FAST_SHADERS[name],
-                optics,
-                None if name == diffuse.NAME else curvature,
-                field if name == plumb.NAME else None,
-            )
-            for name in names
-        }
-        if len(plan.shares) == 1:
-            bodies[thing.index] = made[names[0]]
-        else:
-            lit = tuple(made.get(name) for name in plan.shares)
-            blends[thing.index] = Blend(thing.index, lit, tuple(plan.shares.values()))
-    return bodies, blends
-
-
-def _ambient_field(traced, thing: TracedObject, optics: BodyOptics, curvature, threads: int) -> NDArray[np.float32]:
-    mesh = traced.scene.objects[thing.index].mesh
-    points = np.empty_like(mesh.topology.points)
-    own = traced.triangles[thing.first_triangle : thing.first_triangle + len(mesh.faces)]
-    points[mesh.topology.faces] = traced.vertices[own]
-    return corner_field(mesh, points, curvature, lambda some, axes: plumb.ambient(traced, some, optics, axes), threads)
-
-
-def _corner_curvature(traced: TracedScene, thing: TracedObject) -> NDArray[np.float32]:
-    from sss_tools.curvature import mean_curvature
-
-    mesh = traced.scene.objects[thing.index].mesh
-    return (mean_curvature(mesh)[mesh.faces] * traced.frame.scale).astype(np.float32)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from renderer import render
+from renderer import fast_bodies
 from renderer.render import Renderer, Settings
 from renderer.scene.description import EnvironmentLight
 from renderer.scene.lights import fibonacci_directions
@@ -98,7 +98,7 @@ def test_large_faces_are_left_out_and_asked_pixel_by_pixel():
 
 
 def test_small_pictures_of_meshes_with_many_faces_ask_pixel_by_pixel(monkeypatch):
-    monkeypatch.setattr(render, "_FIELD_FACES", 1000)
+    monkeypatch.setattr(fast_bodies, "_FIELD_FACES", 1000)
     assert renderer(icosphere(1.0, 4), resolution=(32, 32))._fast_bodies[0].ambient is None
 
 
