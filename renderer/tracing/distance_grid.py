@@ -39,7 +39,6 @@ EPSILON = 1e-6
 the place of the voxel's walls: a position times 1/h, shifted, is rounded by half an ulp of each, times h again."""
 BAND = 12
 """Squared distance in voxels up to which the nearest sample is searched: sqrt(12) is the diagonal of two voxels."""
-INSIDE, UNSURE, OUTSIDE = 1, 0, -1
 RESOLUTIONS = (48, 64, 96, 128, 192, 256)
 _HALF_DIAGONAL = np.sqrt(3) / 2
 _LARGEST_REGIONS = 16
@@ -64,13 +63,11 @@ class Scratch:
 class DistanceGrid:
     """Distance bounds over the box of some solids.
 
-    bounds  (voxels,) float32, flat: the proven distance; 0 where nothing is known; OUTSIDE, below zero, where the
-            voxel surely lies outside all solids, so that a path inside one has leaked
-    states  (voxels,) int8 INSIDE or OUTSIDE where the whole voxel surely lies inside one of the solids or outside all,
-            else UNSURE
-    shape   voxels along each side, one more at either end than the box has
-    origin  (3,) float64 outer corner
-    voxel   edge length h
+    bounds   (voxels,) float32, flat: the proven distance; 0 where nothing is known, and outside
+    outside  (voxels,) bool, where the whole voxel surely lies outside all solids: no path flies there
+    shape    voxels along each side, one more at either end than the box has
+    origin   (3,) float64 outer corner
+    voxel    edge length h
     """
 
     def __init__(self, points, faces, resolution: int, solids: Sequence[slice] | None = None):
@@ -103,7 +100,7 @@ class DistanceGrid:
         spacing = h / 2
         samples = cover(points, faces, spacing, self.origin, self.origin + np.array(self.shape) * h)
         squared = squared_distances(self._marked(samples))
-        self.states = self._classify(squared, points, [faces[solid] for solid in solids])
+        self.outside = self._outside(squared, points, [faces[solid] for solid in solids])
         self.slack = COVERING * spacing + EPSILON
         bounds = np.sqrt(squared, dtype=np.float32)
         bounds -= np.float32(2 * _HALF_DIAGONAL + self.slack / h)
@@ -111,16 +108,13 @@ class DistanceGrid:
         np.maximum(bounds, 0, out=bounds)
         self.bounds = bounds.reshape(-1)
         self._tighten(samples, squared)
-        self.bounds[self.states == OUTSIDE] = OUTSIDE
+        # a path that has leaked out is found by its rays
+        self.bounds[self.outside] = 0
 
     def distance(self, position: Float32, out: Float32, scratch: Scratch) -> Float32:
-        """(n,) the bounds of the voxels in which the points (3, n) lie: 0 beyond the grid, OUTSIDE as in ``bounds``."""
+        """(n,) the bounds of the voxels in which the points (3, n) lie; 0 beyond the grid."""
         index = self._index_of(position, scratch)
         return np.take(self.bounds, index, out=out, mode="clip")
-
-    def state(self, position: Float32) -> NDArray[np.int8]:
-        """(n,) INSIDE, OUTSIDE or UNSURE at the points (3, n); UNSURE beyond the grid."""
-        return self.states[self._index_of(position, Scratch(position.shape[1]))]
 
     def centres(self, index: NDArray[np.intp]) -> NDArray[np.float64]:
         """(n, 3) middles of the voxels at flat indices (n,)."""
@@ -158,7 +152,7 @@ class DistanceGrid:
             return
         # marked voxels hold a sample within half a diagonal: their bound is zero. No path flies outside
         wanted = (squared > 0) & (squared <= BAND)
-        if (self.states == OUTSIDE).any():
+        if self.outside.any():
             wanted &= ~self._near_outside()
         index = np.flatnonzero(wanted)
         tree = cKDTree(samples, balanced_tree=False, compact_nodes=False, leafsize=32)
@@ -175,10 +169,10 @@ class DistanceGrid:
         """Voxels within two steps of surely outside ones, which no surface separates from them."""
         from scipy.ndimage import binary_dilation
 
-        return binary_dilation((self.states == OUTSIDE).reshape(self.shape), iterations=2)
+        return binary_dilation(self.outside.reshape(self.shape), iterations=2)
 
-    def _classify(self, squared, points, solids) -> NDArray[np.int8]:
-        """(voxels,) states: regions of voxels that no surface meets lie inside or outside as a whole.
+    def _outside(self, squared, points, solids) -> NDArray[np.bool_]:
+        """(voxels,) as ``outside``: regions of voxels that no surface meets lie inside or outside as a whole.
 
         A voxel holds no surface where its bound is positive, and two that share a side make one convex room. Of
         such a room any point's winding number tells, provided that each solid's sides run as often one way as the
@@ -189,7 +183,7 @@ class DistanceGrid:
         free = squared > int(np.floor((2 * _HALF_DIAGONAL + COVERING / 2 + 2 * EPSILON / self.voxel) ** 2))
         place, _ = weld_exactly(points.astype(float))
         if not all(closes(place[faces]) for faces in solids):
-            return np.zeros(free.size, np.int8)
+            return np.zeros(free.size, bool)
         regions, count = label(free)
         regions = regions.reshape(-1)
         sizes = np.bincount(regions, minlength=count + 1)
@@ -198,9 +192,9 @@ class DistanceGrid:
         voxel_of = np.zeros(count + 1, np.int32)
         voxel_of[regions] = np.arange(regions.size, dtype=np.int32)
         winding = [winding_numbers(self.centres(voxel_of[largest]), points.astype(float), faces) for faces in solids]
-        state_of = np.zeros(count + 1, np.int8)
-        state_of[largest] = np.where((np.abs(winding) > 0.5).any(axis=0), INSIDE, OUTSIDE)
-        return state_of[regions]
+        outside = np.zeros(count + 1, bool)
+        outside[largest] = ~(np.abs(winding) > 0.5).any(axis=0)
+        return outside[regions]
 
 
 def closes(corners: NDArray[np.int64]) -> bool:

@@ -8,9 +8,6 @@ from scipy.spatial import cKDTree
 from renderer.tracing import distance_grid
 from renderer.tracing.distance_grid import (
     EPSILON,
-    INSIDE,
-    OUTSIDE,
-    UNSURE,
     DistanceGrid,
     Scratch,
     Walks,
@@ -151,29 +148,33 @@ def test_look_up_gives_the_voxel_and_zero_beyond_the_grid():
     assert_array_equal(grid.distance(middles, out, Scratch(600)), grid.bounds[index])
     far = np.float32([[9, 0, 0, -9, 1e30, -1e30], [0, -9, 0, 0, 0, 0], [0, 0, 9, 0, 0, 0]])
     assert_array_equal(grid.distance(far, np.empty(6, np.float32), Scratch(6)), 0)
-    assert_array_equal(grid.state(far), UNSURE)
 
 
-def test_states_are_conservative():
-    """Two rings, one inverted as a whole, and a ball with a cavity: no point is called what it is not."""
+def outside_at(grid: DistanceGrid, points):
+    """(n,) whether the voxels of points (n, 3) within the grid surely lie outside."""
+    cells = np.floor((points - grid.origin) / grid.voxel).astype(int)
+    return grid.outside.reshape(grid.shape)[tuple(cells.T)]
+
+
+def test_what_is_surely_outside_is_and_has_no_bound():
+    """Two rings, one inverted as a whole, and a ball with a cavity: no point inside is called outside."""
     rings = joined(torus(), inverted(moved(torus(), (0, 0, 1))))
     mesh = in_unit_frame(joined(rings, moved(hollow_ball(0.6, 0.3, 3), (0, 0, 2))))
     split = [slice(0, 2 * 64 * 24), slice(2 * 64 * 24, 4 * 64 * 24), slice(4 * 64 * 24, len(mesh.faces))]
     grid = DistanceGrid(mesh.vertices, mesh.faces, 48, split)
     points = np.random.default_rng(4).uniform(*mesh.bounds, (300, 3)).astype(np.float32)
     inside = np.any([np.abs(winding_numbers(points, mesh.vertices, mesh.faces[part])) > 0.5 for part in split], axis=0)
-    state = grid.state(np.ascontiguousarray(points.T))
-    assert not inside[state == OUTSIDE].any()
-    assert inside[state == INSIDE].all()
-    # and says something of most points
-    assert (state != UNSURE).mean() > 0.4
-    cavity = np.ascontiguousarray(mesh.vertices[mesh.faces[split[2]]].mean(axis=(0, 1))[:, None], np.float32)
-    assert grid.state(cavity) == OUTSIDE
-    assert grid.distance(cavity, np.empty(1, np.float32), Scratch(1)) == OUTSIDE
+    outside = outside_at(grid, points)
+    assert not (inside & outside).any()
+    # and says so of most that are
+    assert outside[~inside].mean() > 0.5
+    cavity = mesh.vertices[mesh.faces[split[2]]].mean(axis=(0, 1))[None]
+    assert outside_at(grid, cavity)
+    assert grid.distance(np.ascontiguousarray(cavity.T, np.float32), np.empty(1, np.float32), Scratch(1)) == 0
 
 
 def test_nothing_is_surely_outside_an_open_mesh():
-    assert_array_equal(built(MESHES["open"]).states, UNSURE)
+    assert not built(MESHES["open"]).outside.any()
 
 
 def test_only_surfaces_without_boundary_close():
