@@ -19,7 +19,7 @@ BACKGROUND = (250, 250, 248)
 COLOURS = ((205, 200, 190), (141, 190, 160), (240, 190, 110), (150, 175, 220), (220, 150, 150), (185, 165, 215))
 """sRGB of meshes, in turn."""
 INSIDE = (112, 92, 128)
-"""Of the backs of faces."""
+"""Of the backs of faces: seen through holes and clips, and all over where normals point inwards."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,7 +61,8 @@ def thumbnail(meshes: Sequence[Mesh], size: tuple[int, int] = SIZE, eye: Eye | N
 
 
 def _before(points):
-    """A camera in front of the points, a little above and to the right, that holds the ball around them."""
+    """Of a camera in front of the points, a little above and to the right, that holds the ball around them: position
+    (3,), rows right, up and forward (3, 3), slope as in ``Eye``."""
     forward = -np.array([0.35, 0.34, 0.87])
     forward /= np.linalg.norm(forward)
     right = np.cross(forward, [0.0, 1.0, 0.0])
@@ -76,6 +77,7 @@ def _before(points):
 
 
 def _drawn(points, faces, colours, position, axes, slope: float, size: tuple[int, int]) -> bytes:
+    """The PNG of triangles in the unit-size frame, shaded by a lamp at the camera, see ``_before``."""
     from PIL import Image
 
     width, height = size[0] * FINER, size[1] * FINER

@@ -9,21 +9,15 @@ from numpy.typing import NDArray
 
 from sss_tools.errors import InputError
 from sss_tools.thickness import wall_thickness
-from sss_tools.validation.outcome import Severity
 
 from . import palette
 from .specimen import Inspection, Specimen
-from .spots import faces_of
-
-BY = ("finding", "thickness", "shader", "component")
-"""What colours can stand for."""
+from .spots import URGENCY, faces_of
 
 THIN, THICK = 0.1, 100.0
 """Ends of the scale of wall thickness, mean free paths; in between it is logarithmic."""
 SLIGHT = 1e-3
 """Thin end of the scale where no mean free path is known, shares of the longest side; the thick one is 1."""
-
-_URGENCY = {Severity.ERROR: 0, Severity.WARNING: 1, Severity.INFO: 2}
 
 
 @dataclass
@@ -44,7 +38,12 @@ class Legend:
 
 
 def colour_faces(inspection: Inspection, number: int, by: str, legend: Legend) -> NDArray[np.uint8]:
-    """(m, 3) colours of the faces of a specimen; what they mean goes into ``legend``."""
+    """(m, 3) colours of the faces of a specimen; what they mean goes into ``legend``.
+
+    by  "finding", "thickness", "shader" or "component"
+
+    Raises InputError for "shader" where no scene says which.
+    """
     specimen = inspection.specimens[number]
     match by:
         case "thickness":
@@ -66,7 +65,7 @@ def _by_finding(specimen: Specimen, legend: Legend) -> NDArray[np.uint8]:
     if specimen.plan is not None and specimen.plan.state is None:
         colours[:] = palette.mixed(palette.WALL, palette.BACKGROUND, 0.4)  # opaque: the stage, not the play
     faces = {rule.code: faces_of(rule) for rule in specimen.findings}
-    order = sorted(specimen.findings, key=lambda rule: (_URGENCY[rule.severity], len(faces[rule.code])))
+    order = sorted(specimen.findings, key=lambda rule: (URGENCY[rule.severity], len(faces[rule.code])))
     for rule in reversed(order):
         colours[faces[rule.code]] = palette.of_rule(rule)
     for rule in specimen.findings:

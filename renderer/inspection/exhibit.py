@@ -5,11 +5,13 @@ All places are in the inspection's frame, so that single precision is enough whe
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from sss_tools.mesh import Mesh
 from sss_tools.rays import UnitFrame
 
 from . import palette, scenery
@@ -53,6 +55,20 @@ class Surface:
         plain = (self.colours == palette.WALL).all(axis=1, keepdims=True)
         inside = np.array(palette.INSIDE, float)
         return np.where(plain, inside, self.colours + BEHIND * (inside - self.colours)).astype(np.uint8)
+
+    def part(self, faces: NDArray) -> Surface:
+        """Some of the faces, by index or as a mask."""
+        return replace(
+            self, faces=self.faces[faces], colours=self.colours[faces], source=self.source[faces],
+            shining=self.shining[faces],
+        )  # fmt: skip
+
+
+def joined(surfaces: Sequence[Surface]) -> tuple[NDArray[np.float32], NDArray[np.int64]]:
+    """Points (n, 3) and faces (m, 3) of all surfaces, of which there must be one, in their order."""
+    first = np.cumsum([0, *(len(surface.points) for surface in surfaces)])
+    faces = [surface.faces + offset for surface, offset in zip(surfaces, first[:-1], strict=True)]
+    return np.concatenate([surface.points for surface in surfaces]), np.concatenate(faces)
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,19 +128,15 @@ def put_together(inspection: Inspection, colour: str = "finding") -> Exhibit:
     shining = _shining_faces(inspection, spots)
     for number, specimen in enumerate(inspection.specimens):
         surfaces.append(_surface(number, specimen, frame, colour_faces(inspection, number, colour, legend)))
-    visibility = look_round(
-        list(spots), *_joined(surfaces), [_samples(surfaces[spot.specimen], spot) for spot in spots]
-    )
+    visibility = look_round(list(spots), *joined(surfaces), [_samples(surfaces[spot.specimen], spot) for spot in spots])
     for spot, inside in zip(spots, visibility.inside, strict=True):
         if inside:
             shining[spot.specimen][spot.faces] = True
-    surfaces = [
-        Surface(s.points, s.faces, s.colours, s.number, s.source, shining[s.number][s.source]) for s in surfaces
-    ]
+    surfaces = [replace(surface, shining=shining[surface.number][surface.source]) for surface in surfaces]
     reach = _reach(inspection, surfaces)
-    for number, specimen in enumerate(inspection.specimens):
+    for specimen in inspection.specimens:
         if specimen.cap is not None:
-            surfaces.append(_cap(number, specimen, frame))
+            surfaces.append(_cap(specimen.cap, frame))
             legend.add("holes", "cap", palette.CAP)
     strokes = [_edges(spot, inspection, frame) for spot in spots if len(spot.edges)]
     strokes += [_outline(s, inspection, frame) for s in spots if 0 < len(s.faces) <= OUTLINED and not len(s.edges)]
@@ -146,11 +158,10 @@ def _surface(number: int, specimen: Specimen, frame: UnitFrame, colours: NDArray
     )
 
 
-def _cap(number: int, specimen: Specimen, frame: UnitFrame) -> Surface:
-    assert specimen.cap is not None
-    faces = specimen.cap.faces
+def _cap(cap: Mesh, frame: UnitFrame) -> Surface:
+    faces = cap.faces
     colours = np.broadcast_to(np.array(palette.CAP, np.uint8), faces.shape)
-    points = frame.points_in(specimen.cap.vertices).astype(np.float32)
+    points = frame.points_in(cap.vertices).astype(np.float32)
     return Surface(points, faces, colours, -1, np.arange(len(faces)), np.zeros(len(faces), bool))
 
 
@@ -187,14 +198,6 @@ def _shining_faces(inspection: Inspection, spots: tuple[Spot, ...]) -> list[NDAr
         if spot.severity != "info" and not spot.waived and len(spot.faces) < XRAY_SHARE * len(mask):
             mask[spot.faces] = True
     return shining
-
-
-def _joined(surfaces: list[Surface]) -> tuple[NDArray[np.float32], NDArray[np.int64]]:
-    """All triangles of all surfaces."""
-    first = np.cumsum([0, *(len(surface.points) for surface in surfaces)])
-    points = [surface.points for surface in surfaces]
-    faces = [surface.faces + offset for surface, offset in zip(surfaces, first[:-1], strict=True)]
-    return np.concatenate(points), np.concatenate(faces)
 
 
 def _samples(surface: Surface, spot: Spot) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import html
 import json
+import re
 import zlib
 from importlib.resources import files
 from typing import Any
@@ -24,7 +25,7 @@ from .still import close_view
 from .viewpoint import Viewpoint
 
 FACES = 400_000
-"""Most faces that a page draws; larger surfaces are simplified, but for the faces of findings."""
+"""Most faces that a page draws; larger surfaces are simplified, but for what shines through."""
 ASPECT = 1.2
 
 
@@ -33,20 +34,15 @@ def render_page(exhibit: Exhibit, picture: bytes | None = None, clip: Clip | Non
 
     picture  a PNG to show beside the findings, a render perhaps
     """
-    title = exhibit.inspection.title
     parts = {
-        "@TITLE@": html.escape(title),
+        "@TITLE@": html.escape(exhibit.inspection.title),
         "@BODY@": "\n".join([*_verdicts(exhibit), *_picture(picture), *_records(exhibit)]),
         # inside a script element only "<" could end it
         "@DATA@": json.dumps(_data(exhibit, clip), allow_nan=False).replace("<", "\\u003c"),
         "@VIEWER@": _resource("viewer.js"),
     }
-    page = _resource("page.html")
-    for mark, text in parts.items():
-        # one after the other, from the front: what was put in is not looked at again
-        before, _, after = page.rpartition(mark) if mark != "@TITLE@" else ("", "", page.replace(mark, text))
-        page = after if mark == "@TITLE@" else before + text + after
-    return page
+    # all at once: what was put in, a file's name perhaps, is not looked at again
+    return re.sub("|".join(parts), lambda mark: parts[mark[0]], _resource("page.html"))
 
 
 def _resource(name: str) -> str:
@@ -84,13 +80,10 @@ def _packed(array: NDArray, kind: str) -> str:
 
 
 def _lighter(surface: Surface, share: float) -> list[Surface]:
-    """The surface; where it is too large, a simplified one, and what shines or is coloured in full."""
+    """The surface; where it is too large, a simplified one, and what shines through in full."""
     if share >= 1:
         return [surface]
-    kept = surface.shining
-    full = Surface(*(surface.points, surface.faces[kept], surface.colours[kept], surface.number),
-                   source=surface.source[kept], shining=surface.shining[kept])  # fmt: skip
-    return [simplified(surface, int(share * len(surface.faces))), full]
+    return [simplified(surface, int(share * len(surface.faces))), surface.part(surface.shining)]
 
 
 def _surface(surface: Surface) -> dict[str, Any]:

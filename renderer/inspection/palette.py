@@ -1,20 +1,20 @@
-"""Which colour means what. All colours are sRGB, 0 to 255."""
+"""Which colour means what. All colours are sRGB, 0 to 255; those of plain surfaces are the thumbnails', too."""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
 
+from sss_tools import thumbnail
 from sss_tools.validation.outcome import RuleReport, Severity
 
 Colour = tuple[int, int, int]
 
-WALL: Colour = (205, 200, 190)
+WALL: Colour = thumbnail.COLOURS[0]
 """Surface with nothing wrong."""
-INSIDE: Colour = (112, 92, 128)
-"""The back of a surface: seen through holes and clips, and all over where normals point inwards."""
+INSIDE: Colour = thumbnail.INSIDE
+BACKGROUND: Colour = thumbnail.BACKGROUND
 CAP: Colour = (150, 205, 235)
-BACKGROUND: Colour = (250, 250, 248)
 INK: Colour = (38, 38, 42)
 CAMERA: Colour = (60, 60, 70)
 LIGHT: Colour = (214, 150, 0)
@@ -49,16 +49,15 @@ RULES: dict[str, Colour] = {
 """Of each rule; loud for what ruins light, duller for what is good to know."""
 
 ROLES: dict[str, Colour] = {
-    "solid": (205, 200, 190),
+    "solid": WALL,
     "cavity": (60, 160, 205),
     "internal": (230, 30, 100),
     "sheet": (255, 150, 40),
 }
 
 COMPONENTS: tuple[Colour, ...] = (
-    *((205, 200, 190), (141, 190, 160), (240, 190, 110), (150, 175, 220), (220, 150, 150), (185, 165, 215)),
-    *((170, 200, 100), (110, 195, 205), (230, 165, 200), (190, 170, 130)),
-)
+    *thumbnail.COLOURS, (170, 200, 100), (110, 195, 205), (230, 165, 200), (190, 170, 130)
+)  # fmt: skip
 """Of components of one role, in turn."""
 
 SHADERS: dict[str, Colour] = {

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from sss_tools.rays import RayCaster
 
 from . import palette
-from .exhibit import Exhibit, Surface
+from .exhibit import Exhibit, Surface, joined
 from .layer import FINER, NEARER, Clip, Layer, averaged
 from .viewpoint import Viewpoint
 
@@ -20,7 +20,7 @@ class RayArtist:
         self._exhibit, self._clip = exhibit, clip
         surfaces = exhibit.surfaces
         self._all = _Triangles(surfaces)
-        self._shining = _Triangles(tuple(_only_shining(surface) for surface in surfaces))
+        self._shining = _Triangles(tuple(surface.part(surface.shining) for surface in surfaces))
 
     def draw(self, view: Viewpoint, size: tuple[int, int], shining: bool = False) -> Layer:
         """Everything, or only what shines through, in a picture of ``size`` (width, height)."""
@@ -98,9 +98,7 @@ class _Triangles:
         self.caster: RayCaster | None = None
         if not surfaces:
             return
-        first = np.cumsum([0, *(len(surface.points) for surface in surfaces)])
-        points = np.concatenate([surface.points for surface in surfaces])
-        faces = np.concatenate([surface.faces + offset for surface, offset in zip(surfaces, first[:-1], strict=True)])
+        points, faces = joined(surfaces)
         a, b, c = (points[faces[:, k]].astype(float) for k in range(3))
         normals = np.cross(b - a, c - a)
         length = np.linalg.norm(normals, axis=1, keepdims=True)
@@ -108,11 +106,3 @@ class _Triangles:
         self.colours = np.concatenate([surface.colours for surface in surfaces]).astype(float)
         self.backs = np.concatenate([surface.backs for surface in surfaces]).astype(float)
         self.caster = RayCaster(points, faces)
-
-
-def _only_shining(surface: Surface) -> Surface:
-    kept = surface.shining
-    return Surface(
-        surface.points, surface.faces[kept], surface.colours[kept], surface.number, surface.source[kept],
-        surface.shining[kept],
-    )  # fmt: skip

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from .exhibit import Surface
@@ -40,7 +42,4 @@ def _on_grid(surface: Surface, lower, side: float) -> Surface:
     # of faces that have become the same one is enough
     _, first = np.unique(np.sort(faces[kept], axis=1), axis=0, return_index=True)
     kept = kept[np.sort(first)]
-    return Surface(
-        points.astype(np.float32), faces[kept], surface.colours[kept], surface.number, surface.source[kept],
-        surface.shining[kept],
-    )  # fmt: skip
+    return replace(surface.part(kept), points=points.astype(np.float32), faces=faces[kept])

@@ -21,7 +21,8 @@ SLIVER = 1e-9
 
 Indices = NDArray[np.int64]
 
-_URGENCY = {Severity.ERROR: 0, Severity.WARNING: 1, Severity.INFO: 2}
+URGENCY = {Severity.ERROR: 0, Severity.WARNING: 1, Severity.INFO: 2}
+"""Rank of severities, the most urgent first."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,7 +63,7 @@ def find_spots(inspection: Inspection) -> list[Spot]:
         points = frame.points_in(specimen.mesh.vertices)
         for rule in specimen.findings:
             spots += _spots(number, specimen, rule, points, frame.scale)
-    return sorted(spots, key=lambda spot: (_URGENCY[spot.severity], spot.waived, spot.specimen, spot.code))
+    return sorted(spots, key=lambda spot: (URGENCY[spot.severity], spot.waived, spot.specimen, spot.code))
 
 
 def faces_of(rule: RuleReport) -> Indices:

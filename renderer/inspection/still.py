@@ -25,7 +25,6 @@ SMALL = 28
 POINTERS = 150
 """Rings drawn, at most."""
 
-_LEVELS = {Severity.ERROR: "error", Severity.WARNING: "warning", Severity.INFO: "info"}
 _FAINT = palette.mixed(palette.INK, palette.BACKGROUND, 0.35)
 
 
@@ -187,7 +186,7 @@ def _about(specimen, several: bool) -> list[Line]:
     if specimen.plan is not None:
         lines.append(Line(f"shader: {specimen.plan.shader}", ink=_FAINT))
     for rule in specimen.findings:
-        level = "waived" if rule.reason is not None else _LEVELS[rule.severity]
+        level = "waived" if rule.reason is not None else str(rule.severity)
         lines.append(Line(f"{rule.code} {rule.name} ({level})", palette.of_rule(rule), 14, gap=0))
         lines.append(Line(f"{rule.message}", size=12, ink=_FAINT, gap=7))
     if not specimen.findings:
