@@ -166,8 +166,7 @@ def views(mesh: Mesh) -> list[Camera]:
 
 def medium_for(mesh: Mesh) -> Translucent:
     """``DEPTH`` mean free paths to the middle."""
-    radius = 3 * abs(mesh.volume) / mesh.area
-    return Translucent(Medium.from_albedo(ALBEDO, DEPTH / radius, ior=1.5))
+    return Translucent(Medium.from_albedo(ALBEDO, DEPTH / mesh.mean_inradius, ior=1.5))
 
 
 def pictures(mesh: Mesh, material, cameras, lights, handling: str, passes: int):

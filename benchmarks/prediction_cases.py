@@ -122,10 +122,9 @@ def _bumps(depth: float, waves: float) -> Mesh:
 
 def _scene(rng, mesh: Mesh) -> Scene:
     """The mesh in a medium under lights, seen from somewhere."""
-    inradius = 3 * abs(mesh.volume) / mesh.area
     tau = np.exp(rng.uniform(np.log(0.5), np.log(40)))
     albedo = 1 - np.exp(rng.uniform(np.log(1e-3), np.log(0.6), 3))
-    medium = Medium.from_albedo(albedo, tau / inradius, 0.0, rng.choice([1.3, 1.5]))
+    medium = Medium.from_albedo(albedo, tau / mesh.mean_inradius, 0.0, rng.choice([1.3, 1.5]))
     middle, size = mesh.bounds.mean(axis=0), mesh.diagonal
     view, shine = (_direction(rng) for _ in range(2))
     pixels = np.exp(rng.uniform(np.log(6), np.log(LARGEST)))

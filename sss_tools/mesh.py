@@ -126,6 +126,11 @@ class Mesh:
         first = self.vertices[self.faces[:, 0]] - self.bounds.mean(axis=0)
         return float(np.einsum("ij,ij->", first, self.face_vectors) / 6)
 
+    @property
+    def mean_inradius(self) -> float:
+        """3 V / A, mesh units: the radius of the ball with this ratio of volume to area; 0 without area."""
+        return 3 * abs(self.volume) / self.area if self.area > 0 else 0.0
+
     @cached_property
     def topology(self) -> Topology:
         """Which faces meet where, with exactly equal positions taken as one point."""

@@ -32,7 +32,7 @@ class Appearance:
 
     distance   scene units
     footprint  side of a pixel at the object, scene units
-    size_px    diameter in pixels
+    size_px    longest side of the bounding box, what the eye takes for an object's size, in pixels
     depth      tau, inradius in transport mean free paths
     diffusion  diffusion length, scene units
     aspect     longest over shortest extent
@@ -70,14 +70,14 @@ def appearance(scene: Scene, thing: SceneObject) -> Appearance:
     depth, diffusion, absorbed = 0.0, 0.0, 1.0
     if isinstance(thing.material, Translucent):
         medium = thing.material.medium
-        depth, diffusion = _optical_size(medium, _inradius(mesh))
+        depth, diffusion = _optical_size(medium, mesh.mean_inradius)
         absorbed = float(np.mean(1 - np.asarray(medium.reduced_albedo, float)))
     unlit, even = _lighting(scene.lights, centre, position)
     in_the_middle = pixel_footprint(camera, max(float(np.linalg.norm(position - centre)), footprint))
     return Appearance(
         distance=distance,
         footprint=footprint,
-        size_px=_diameter(mesh) / in_the_middle,
+        size_px=mesh.longest_side / in_the_middle,
         depth=depth,
         diffusion=diffusion,
         aspect=_aspect(mesh),
@@ -93,16 +93,6 @@ def appearance(scene: Scene, thing: SceneObject) -> Appearance:
 def pixel_footprint(camera: Camera, distance: float) -> float:
     """Side of the square that a pixel covers at ``distance``, in its unit."""
     return 2 * distance * float(np.tan(np.radians(camera.fov) / 2)) / camera.resolution[1]
-
-
-def _diameter(mesh: Mesh) -> float:
-    """The longest side of the bounding box: what the eye takes for an object's size."""
-    return mesh.longest_side
-
-
-def _inradius(mesh: Mesh) -> float:
-    """3 V / A, the radius of the ball with this ratio of volume to area."""
-    return 3 * abs(mesh.volume) / mesh.area if mesh.area > 0 else 0.0
 
 
 def _roundness(mesh: Mesh) -> float:

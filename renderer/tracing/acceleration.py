@@ -69,7 +69,7 @@ def _jumps_pay(scene: TracedScene, thing: TracedObject) -> bool:
     if medium.ior == 1 and scene.lights.sampled:
         return False
     mesh = scene.scene.objects[thing.index].mesh
-    inradius = 3 * abs(mesh.volume) / max(mesh.area, 1e-300) / scene.frame.scale
+    inradius = mesh.mean_inradius / scene.frame.scale
     return bool(medium.single_scattering_albedo.max() >= JUMP_ALBEDO and inradius * medium.sigma_t[0] >= JUMP_INRADIUS)
 
 
