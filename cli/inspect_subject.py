@@ -36,7 +36,7 @@ def inspection_of(options: Any, warn: Warn) -> Inspection:
     """What there is to look at. ``warn`` is told what is odd, one line each. Raises InputError."""
     path = Path(options.subject)
     if path.name.endswith(RECORD):
-        return _of_record(path, options, warn)
+        return _of_record(path, options)
     if path.suffix.lower() == ".toml":
         return _of_scene(path, options, warn)
     return _of_mesh(path, options, warn)
@@ -76,7 +76,7 @@ def _of_mesh(path: Path, options: Any, warn: Warn) -> Inspection:
     return Inspection(path.name, (specimen,), scene, options.unit or "units")
 
 
-def _of_record(path: Path, options: Any, warn: Warn) -> Inspection:
+def _of_record(path: Path, options: Any) -> Inspection:
     """The findings as a record has them; nothing is checked."""
     from renderer.inspection.specimen import Inspection, Specimen
 

@@ -15,7 +15,7 @@ from .command import ArgumentParser, complain, progress, run
 
 if TYPE_CHECKING:
     from renderer.inspection.exhibit import Exhibit
-    from renderer.inspection.layer import Artist, Clip
+    from renderer.inspection.layer import Artist
 
 PROGRAM = "sss-inspect"
 
@@ -105,11 +105,11 @@ def _refuse_without_screen() -> None:
 def _write_still(exhibit: Exhibit, options: Any) -> None:
     from renderer.inspection.still import compose, png
 
-    artist = _artist(exhibit, options.clip, options)
+    artist = _artist(exhibit, options)
     _write(options.screenshot, png(compose(exhibit, artist, options.size, options.clip)))
 
 
-def _artist(exhibit: Exhibit, clip: Clip | None, options: Any) -> Artist:
+def _artist(exhibit: Exhibit, options: Any) -> Artist:
     """VTK where it can draw, else our own rays."""
     from renderer.inspection import gl
     from renderer.inspection.ray_artist import RayArtist
@@ -118,10 +118,10 @@ def _artist(exhibit: Exhibit, clip: Clip | None, options: Any) -> Artist:
     if drawable.window is None:
         if not options.quiet:
             complain(PROGRAM, f"{drawable.problem}; the still is made by our own tracer", "warning")
-        return RayArtist(exhibit, clip)
+        return RayArtist(exhibit, options.clip)
     from renderer.inspection.vtk_artist import VtkArtist
 
-    return VtkArtist(exhibit, clip)
+    return VtkArtist(exhibit, options.clip)
 
 
 def _say(exhibit: Exhibit, options: Any) -> None:

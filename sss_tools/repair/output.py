@@ -22,8 +22,6 @@ MARKER = "sss-check fix"
 """Stands in a comment of what we wrote, before a hash of all that follows it: a file that was edited since is not
 ours any more."""
 
-KEEPS_MATERIALS = (".obj", ".glb")
-
 
 def plan_outputs(meshes: Iterable[str], given: Iterable[str], folder: str | None = None) -> dict[str, str]:
     """Where the result of each of ``meshes`` goes, without the extension: ``STEM.fixed``.

@@ -14,7 +14,7 @@ Float32 = NDArray[np.float32]
 
 
 class PointSource:
-    """A point light; ``illuminate`` as for every source without extent."""
+    """A point light: (3, 1) position, and intensity, power per solid angle, in the frame."""
 
     def __init__(self, position: Float32, intensity: Float32):
         self.position, self.intensity = position, intensity
@@ -22,16 +22,19 @@ class PointSource:
     @classmethod
     def of(cls, light: PointLight, frame: UnitFrame) -> PointSource:
         """The light in the frame."""
-        return cls(column(frame.points_in(light.position)),
-                   column(np.asarray(light.intensity, float) / frame.scale**2))  # fmt: skip
+        intensity = np.asarray(light.intensity, float) / frame.scale**2
+        return cls(column(frame.points_in(light.position)), column(intensity))
 
     def illuminate(self, position: Float32) -> Illumination:
         """What arrives at ``position`` (3, n)."""
-        return _from_point(self.position, position, self.intensity)
+        offset = self.position - position
+        squared = np.maximum(np.einsum("ij,ij->j", offset, offset), np.float32(1e-20))
+        distance = np.sqrt(squared)
+        return Illumination(offset / distance, distance, self.intensity / squared)
 
 
 class DirectionalSource:
-    """Parallel light."""
+    """Parallel light: (3, 1) unit vector towards it, and irradiance across the beam."""
 
     def __init__(self, towards: Float32, irradiance: Float32):
         self.towards, self.irradiance = towards, irradiance
@@ -46,10 +49,3 @@ class DirectionalSource:
         n = position.shape[1]
         direction = np.broadcast_to(self.towards, (3, n))
         return Illumination(np.ascontiguousarray(direction), np.full(n, np.inf, np.float32), self.irradiance)
-
-
-def _from_point(source: Float32, position: Float32, intensity: Float32) -> Illumination:
-    offset = source - position
-    squared = np.maximum(np.einsum("ij,ij->j", offset, offset), np.float32(1e-20))
-    distance = np.sqrt(squared)
-    return Illumination(offset / distance, distance, intensity / squared)
