@@ -11,12 +11,13 @@ from typing import TYPE_CHECKING, Any
 from sss_tools.errors import InputError
 from sss_tools.keys import did_you_mean
 from sss_tools.loading import SUFFIXES, load_mesh
+from sss_tools.medium import Medium
 from sss_tools.mesh import Mesh
 from sss_tools.reading import read_file
 from sss_tools.record import Record, geometry_hash, read_record, record_path
 from sss_tools.validation.outcome import FixSafety, MeshReport, Outcome, RuleReport, Severity
 from sss_tools.validation.rule import Context, Subject, all_rules
-from sss_tools.validation.run import FAULTS, check_subject
+from sss_tools.validation.run import FAULTS, LISTED, check_subject
 from sss_tools.validation.settings import Settings
 from sss_tools.waivers import waive
 
@@ -36,7 +37,7 @@ def inspection_of(options: Any, warn: Warn) -> Inspection:
     """What there is to look at. ``warn`` is told what is odd, one line each. Raises InputError."""
     path = Path(options.subject)
     if path.name.endswith(RECORD):
-        return _of_record(path, options)
+        return _of_record(path, options, warn)
     if path.suffix.lower() == ".toml":
         return _of_scene(path, options, warn)
     return _of_mesh(path, options, warn)
@@ -52,7 +53,7 @@ def scene_of(options: Any) -> Scene:
         return load_scene(path)
     from renderer.scene.staging import stage_mesh
 
-    return stage_mesh(_drawable(path), options.material, unit=options.unit or "mm")
+    return stage_mesh(_drawable(path), _medium(options), unit=options.unit or "mm")
 
 
 def _refuse_mesh_options(path: Path, options: Any) -> None:
@@ -64,19 +65,19 @@ def _refuse_mesh_options(path: Path, options: Any) -> None:
 def _of_mesh(path: Path, options: Any, warn: Warn) -> Inspection:
     from renderer.inspection.specimen import Inspection
 
-    medium = None if options.material is None else medium_of(options.material, options.unit or "mm")
+    medium = _medium(options)
     specimen = _checked(path, _drawable(path), Context(medium, options.unit), _settings(options), warn)
     specimen = replace(specimen, medium=medium)
     scene = None
     if options.color == "shader":
         from renderer.scene.staging import stage_mesh
 
-        scene = stage_mesh(specimen.mesh, None, unit=options.unit or "mm")
+        scene = stage_mesh(specimen.mesh, medium, unit=options.unit or "mm")
         specimen = _planned(scene, (specimen,))[0]
     return Inspection(path.name, (specimen,), scene, options.unit or "units")
 
 
-def _of_record(path: Path, options: Any) -> Inspection:
+def _of_record(path: Path, options: Any, warn: Warn) -> Inspection:
     """The findings as a record has them; nothing is checked."""
     from renderer.inspection.specimen import Inspection, Specimen
 
@@ -94,8 +95,10 @@ def _of_record(path: Path, options: Any) -> Inspection:
     report = _recorded(mesh_path, mesh, record, _wanted(options))
     subject = Subject(mesh)
     specimen = Specimen(mesh_path.name, mesh, report, subject.assessment, record=data)
-    notes = [f"as recorded; of {rule.code} the first {len(rule.faces)} faces are listed"
+    notes = [f"of {rule.code} {rule.name} only the first {LISTED} places of each kind, which a record lists, are drawn"
              for rule in report.shown if rule.truncated]  # fmt: skip
+    for note in notes:
+        warn(f"{path}: {note}; sss-inspect {mesh_path} shows all")
     return Inspection(path.name, (_capped(specimen),), notes=tuple(notes))
 
 
@@ -121,6 +124,11 @@ def _of_scene(path: Path, options: Any, warn: Warn) -> Inspection:
         cap = None if specimen.cap is None else moved(specimen.cap, entry.surroundings.placed.matrix)
         specimens.append(replace(specimen, name=thing.name, mesh=thing.mesh, medium=medium, cap=cap))
     return Inspection(path.name, _planned(scene, tuple(specimens)), scene, scene.unit)
+
+
+def _medium(options: Any) -> Medium | None:
+    """What a bare mesh is made of, as ``--material`` says. Raises InputError."""
+    return None if options.material is None else medium_of(options.material, options.unit or "mm")
 
 
 def _drawable(path: Path) -> Mesh:

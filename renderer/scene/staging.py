@@ -32,11 +32,14 @@ _KEY_DISTANCE, _KEY_HALF = 2.1, 1.9  # in longest sides: it fills 1.9 sr, for so
 _UPWARD = np.array([0.0, 1.0, 0.0])
 
 
-def stage_mesh(mesh: Mesh, material: str | None = None, size: tuple[int, int] = (500, 500), unit: str = "mm") -> Scene:
+def stage_mesh(
+    mesh: Mesh, material: Medium | str | None = None, size: tuple[int, int] = (500, 500), unit: str = "mm"
+) -> Scene:
     """The mesh alone in soft light, filling the picture.
 
-    material  name of a preset, converted by ``unit``; None: marble's albedo, ior 1.5, at a mean free path of
-              ``MEAN_FREE_PATH`` times the longest side, which looks the same at any scale
+    material  a medium with coefficients per mesh unit, or the name of a preset, converted by ``unit``; None: marble's
+              albedo, ior 1.5, at a mean free path of ``MEAN_FREE_PATH`` times the longest side, which looks the same
+              at any scale
     size      width and height of the picture, pixels
     unit      what one mesh unit is
 
@@ -61,7 +64,9 @@ def stage_mesh(mesh: Mesh, material: str | None = None, size: tuple[int, int] = 
     return with_hash(Scene(unit, camera, lights, (thing,)))
 
 
-def _medium(mesh: Mesh, material: str | None, unit: str) -> Medium:
+def _medium(mesh: Mesh, material: Medium | str | None, unit: str) -> Medium:
+    if isinstance(material, Medium):
+        return material
     if material is None:
         marble = Medium.preset("marble", "mm")
         sigma_t = np.full(3, 1 / (MEAN_FREE_PATH * mesh.longest_side))

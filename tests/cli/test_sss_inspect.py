@@ -2,13 +2,14 @@
 
 import json
 import os
+from argparse import Namespace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from PIL import Image
 
-from cli import sss_inspect
+from cli import inspect_subject, sss_inspect
 from cli.sss_check import main as check
 from sss_tools import shapes
 from sss_tools.mesh import Mesh
@@ -94,6 +95,37 @@ def test_a_record_shows_what_it_says_and_goes_on_the_page(holes, by_rays, capsys
     assert sss_inspect.main(["holes.ply.sss.json", "--html", "a.html"]) == 0
     assert capsys.readouterr().out == "a.html: 1 finding in 2 places\n"
     assert "blake2b:" in Path("a.html").read_text()
+
+
+def test_a_record_that_lists_only_some_faces_says_so_and_who_shows_all(workplace, by_rays, capsys):
+    write_mesh(shapes.inverted(shapes.icosphere(1.0, 3)), "inverted.ply")  # 1280 faces
+    check(["inverted.ply", "--record", "-q"])
+    capsys.readouterr()
+    assert sss_inspect.main(["inverted.ply.sss.json", "--html", "a.html"]) == 0
+    error = capsys.readouterr().err
+    assert error.count("\n") == 1 and "only the first 1000" in error and "sss-inspect inverted.ply shows all" in error
+    assert "only the first 1000" in Path("a.html").read_text()
+    assert sss_inspect.main(["inverted.ply", "--html", "b.html"]) == 0
+    assert "only the first" not in capsys.readouterr().err + Path("b.html").read_text()
+
+
+@pytest.mark.parametrize("unit", [None, "cm"])
+def test_the_live_picture_takes_a_material_from_a_file_and_in_its_own_unit(workplace, unit):
+    Path("wax.toml").write_text("albedo = [0.9, 0.8, 0.7]\nsigma_t = 2.0\n")
+    scene = inspect_subject.scene_of(Namespace(subject="ball.ply", material="wax.toml", unit=unit))
+    (thing,) = scene.objects
+    # per millimetre in the file
+    assert thing.material.medium.sigma_t == pytest.approx([2.0 if unit is None else 20.0] * 3)
+
+
+def test_the_shader_shown_is_that_of_the_material_named(holes, by_rays):
+    """Two millimetres of ketchup are thinner, optically, than what a bare mesh is made of unless somebody says."""
+    chosen = []
+    for material in ([], ["--material", "ketchup"]):
+        options = ["holes.ply", "--color", "shader", "--html", "a.html", "-q", *material]
+        assert sss_inspect.main(options) == 0
+        chosen.append(Path("a.html").read_text().split("shader: ")[1].split("</p>")[0])
+    assert chosen[0] != chosen[1]
 
 
 def test_a_record_of_another_mesh_is_refused(holes, capsys):

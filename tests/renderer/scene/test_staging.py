@@ -93,6 +93,11 @@ def test_preset_is_converted_by_the_unit():
     assert stage_mesh(box(), "skin1", unit="cm").objects[0].material.medium == Medium.preset("skin1", "cm")
 
 
+def test_a_medium_is_taken_as_it_is_whatever_the_unit():
+    medium = Medium.from_albedo([0.9, 0.8, 0.7], 3.0)
+    assert stage_mesh(box(), medium, unit="cm").objects[0].material.medium is medium
+
+
 def test_environment_is_dim_beside_the_light():
     environment, rectangle = stage_mesh(box()).lights
     assert isinstance(environment, EnvironmentLight)
