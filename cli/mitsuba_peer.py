@@ -40,9 +40,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     import numpy as np
 
     mi.set_variant(options.variant)
-    built = time.time()
+    built = time.monotonic()
     scene = mi.load_file(str(options.scene), rr_depth=ROULETTE_DEPTH)
-    begun = time.time()
+    begun = time.monotonic()
     total, left, call = 0.0, options.passes, 0
     width, height = scene.sensors()[0].film().size()
     most = max(LANES // (width * height), 1)
@@ -51,10 +51,10 @@ def main(argv: Sequence[str] | None = None) -> int:
         total = total + samples * np.array(mi.render(scene, spp=samples, seed=1_000_003 * options.seed + call), float)
         left, call = left - samples, call + 1
     image = np.asarray(total) / options.passes
-    ended = time.time()
+    ended = time.monotonic()
     np.savez(options.output, image=image.astype(np.float32))
     seconds = {
-        "seconds": time.time() - started,
+        "seconds": time.monotonic() - started,
         "setup": begun - started,
         "build": begun - built,
         "render": ended - begun,
