@@ -73,7 +73,7 @@ def odd_meshes(folder: Path) -> dict[str, Mesh]:
     beside = shapes.moved(ball, (1.2, 0, 0))
     made = {
         "sheet": square,
-        "Möbius strip": moebius_strip(),
+        "Moebius strip": moebius_strip(),
         "bowl": shapes.punctured(ball, [[0, 1, 0]], 1.85),
         "ball with a hole": cut,
         "the same, inside out": shapes.inverted(cut),
