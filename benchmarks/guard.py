@@ -17,6 +17,7 @@ from pathlib import Path
 import numpy as np
 
 from renderer.study import guard
+from renderer.study.methods import FAST
 
 ROOT = Path(__file__).resolve().parents[1]
 SEED = 50
@@ -37,7 +38,7 @@ def main() -> None:
             arrays[f"{name}_mean{k}"] = exact.means[k].astype(np.float32)
             arrays[f"{name}_stderr{k}"] = exact.stderrs[k].astype(np.float32)
         arrays[f"{name}_where"], arrays[f"{name}_passes"] = exact.where, np.array(exact.passes)
-        for method in guard.FAST:
+        for method in FAST:
             shown = guard.pictures(scene, method, SEED + 1)
             biases[f"{name} {method}"] = asdict(guard.truth(exact).bias(shown.means))
     np.savez_compressed(folder / "guard.npz", **arrays)

@@ -21,12 +21,13 @@ from numpy.typing import NDArray
 
 from sss_tools.shapes import icosphere, slab
 
-from ..render import Renderer, Settings
+from ..render import Renderer
 from ..scene.description import Scene
 from ..scene.scene_file import load_scene
 from .accuracy import Truth
 from .case import CAMERA, MEDIUM, SKY, SUN, Case
 from .judges import Bias, Estimate, compare_tiles, sidak
+from .methods import settings
 
 FALSE_ALARM = 1e-3
 """Of all tests of accuracy together, in one run."""
@@ -35,7 +36,6 @@ SPEED_BOUND = 2.0
 REPEATS, ATTEMPTS = 5, 3
 PASSES = {"path": 64, "plumb": 16, "scalar": 16, "diffuse": 16}
 SPEED_PASSES = {"path": 12, "plumb": 24, "scalar": 64, "diffuse": 64}
-FAST = ("plumb", "scalar", "diffuse")
 TILE = 4
 _VIEW = {**CAMERA, "resolution": [24, 24]}
 
@@ -83,7 +83,7 @@ def pictures(scene: Scene, method: str, seed: int, longer: int = 1) -> Pictures:
     """Two pictures of ``method`` with other random numbers; ``longer`` times the usual passes."""
     films = []
     for k in (0, 1):
-        renderer = _renderer(scene, method, 2 * seed + k)
+        renderer = Renderer(scene, settings(method, 2 * seed + k))
         renderer.run(range(longer * PASSES[method]))
         films.append(renderer.film)
     one, two = films
@@ -204,7 +204,7 @@ def speed_ratios(scene: Scene, repeats: int = REPEATS, work: int = 1) -> dict[st
 
     work  renders so many times what is measured: a planted loss
     """
-    renderers = {method: _renderer(scene, method, 1, threads=1) for method in SPEED_PASSES}
+    renderers = {method: Renderer(scene, settings(method, 1, threads=1)) for method in SPEED_PASSES}
     kernel, least = Kernel(), dict.fromkeys(["kernel", "set-up", *SPEED_PASSES], float("inf"))
     first = 0
 
@@ -215,14 +215,9 @@ def speed_ratios(scene: Scene, repeats: int = REPEATS, work: int = 1) -> dict[st
 
     for _ in range(repeats):
         clock("kernel", kernel.run)
-        clock("set-up", lambda: [_renderer(scene, "path", 1, threads=1) for _ in range(work)])
+        clock("set-up", lambda: [Renderer(scene, settings("path", 1, threads=1)) for _ in range(work)])
         for method, renderer in renderers.items():
             passes = range(first, first + work * SPEED_PASSES[method])
             clock(method, lambda renderer=renderer, passes=passes: renderer.run(passes))  # type: ignore[misc]
         first += work * max(SPEED_PASSES.values())
     return {name: seconds / least["kernel"] for name, seconds in least.items() if name != "kernel"}
-
-
-def _renderer(scene: Scene, method: str, seed: int, threads: int | None = None) -> Renderer:
-    shader, handling = ("auto", "surface") if method == "diffuse" else (method, "auto")
-    return Renderer(scene, Settings(shader, handling, seed=seed, threads=threads))

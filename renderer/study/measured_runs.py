@@ -21,6 +21,8 @@ from numpy.typing import NDArray
 
 from sss_tools.errors import InputError
 
+from . import methods
+
 LOG = "runs.jsonl"
 ABOUT = "about.json"
 PICTURES = "pictures"
@@ -234,12 +236,10 @@ def add_to_log(path: Path, entry: dict[str, Any]) -> None:
 
 def arguments(task: Task) -> list[str]:
     """What ``sss-render`` is told for a task of ours, but for the output."""
-    how = {
-        "auto": ["--quality", f"{task.quality:g}"] if task.quality is not None else [],
-        # an object without an inside falls back to it
-        "diffuse": ["--hole-handling", "surface"],
-        "reference": ["--shader", "path"],
-    }.get(task.method, ["--shader", task.method])
+    if task.method == "auto":
+        how = [] if task.quality is None else ["--quality", f"{task.quality:g}"]
+    else:
+        how = methods.options("path" if task.method == "reference" else task.method)
     return [task.source, *how, "--passes", str(task.passes), "--seed", str(task.seed)]
 
 

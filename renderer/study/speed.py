@@ -15,6 +15,7 @@ from statistics import mean, median
 from .accuracy import Truth
 from .judges import Bias
 from .measured_runs import Lab, PeerFailed, Run, Task
+from .methods import FAST, SHADERS
 
 STEP, LONG_STEP = 4, 16
 """From one number of passes to the next; the long one while even so many times the rendering is shorter than the
@@ -24,8 +25,7 @@ LEAST_POINTS = 2
 SHARES = {"path": 0.3, "plumb": 0.05, "scalar": 0.03, "diffuse": 0.03, "auto": 0.13, "mitsuba": 0.12}
 REFERENCE_SHARE = 0.34
 """Of a scene's time. Both halves of the reference have some five times the passes of the longest run judged by them."""
-FAST = ("plumb", "scalar", "diffuse")
-METHODS = ("path", *FAST, "auto", "mitsuba")
+METHODS = (*SHADERS, "auto", "mitsuba")
 MOST_FAST_PASSES = 256
 """Then pixels have no jags left, and a fast method is as good as it gets."""
 MOST_AUTO_PASSES = 64

@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 
 from .drawing import COLOURS, LABELS, MARKERS, log_ticks, pyplot, save
-from .speed import FAST, METHODS, SURE, Measured, Point
+from .methods import FAST
+from .speed import METHODS, SURE, Measured, Point
 
 PANELS = (
     ("seconds", "rms", "whole command, build included", "relative RMS error"),

@@ -20,13 +20,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..job import rare_event_warnings
-from ..render import Renderer, Settings
+from ..render import Renderer
 from ..scene.scene_file import load_scene
-from ..shaders.selection import appearance, select, tolerance
+from ..shaders.appearance import appearance
+from ..shaders.selection import select, tolerance
 from .accuracy import Truth
 from .measured_runs import add_to_log, read_log
+from .methods import SHADERS, options, settings
 from .stability import QUALITIES, Choice, Found, Outcome, Step
-from .studies import METHODS, Study
+from .studies import Study
 
 HALF_SEEDS, FAST_SEEDS, TRUTH_SEEDS = (1, 2), (3, 4), (5, 6)
 """Apart from each other: a shader draws the same places in a pixel from the same seed."""
@@ -109,7 +111,7 @@ class Bench:
         own = Truth((halves[0], halves[1]), pixels)
         noise = float(np.nanmean([one.film.mean_relative_stderr() for one in renderer]))
         outcomes = []
-        for method in METHODS:
+        for method in SHADERS:
             if method == "path":
                 images, rare, seeds = halves, _rare(renderer), HALF_SEEDS
             else:
@@ -142,7 +144,7 @@ class Bench:
         scene, cpu, passes = load_scene(path), 0.0, PILOT_PASSES
         renderers: list[Renderer] = []
         for seed in seeds:
-            renderer = Renderer(scene, Settings("path", seed=seed))
+            renderer = Renderer(scene, settings("path", seed))
             begun = time.process_time()
             renderer.run(range(PILOT_PASSES))
             if not renderers:
@@ -158,8 +160,7 @@ class Bench:
     def _fast(self, path: Path, method: str, seeds: Sequence[int]) -> tuple[list[NDArray], str, float]:
         scene, images, renderers, cpu = load_scene(path), [], [], 0.0
         for seed in seeds:
-            settings = Settings(_shader(method), _handling(method), seed=seed)
-            renderer = Renderer(scene, settings)
+            renderer = Renderer(scene, settings(method, seed))
             begun = time.process_time()
             renderer.run(range(FAST_PASSES))
             cpu += (time.process_time() - begun) / len(seeds)
@@ -192,20 +193,10 @@ def _filled(renderers: Sequence[Renderer]) -> NDArray[np.bool_]:
     return _blocks(pixels.astype(float))[..., 0] == 1
 
 
-def _shader(method: str) -> str:
-    # an object without an inside falls back to diffuse
-    return "auto" if method == "diffuse" else method
-
-
-def _handling(method: str) -> str:
-    return "surface" if method == "diffuse" else "auto"
-
-
 def _commands(path: Path, method: str, passes: int, seeds: Sequence[int]) -> str:
     """From the folder of the CSV."""
-    how = ["--hole-handling", "surface"] if method == "diffuse" else ["--shader", method]
     return " && ".join(
-        shlex.join(["sss-render", f"scenes/{path.name}", *how, "--passes", str(passes), "--seed", str(seed),
+        shlex.join(["sss-render", f"scenes/{path.name}", *options(method), "--passes", str(passes), "--seed", str(seed),
                     "-o", f"{path.stem}-{method}-{seed}.npz"])
         for seed in seeds
     )  # fmt: skip

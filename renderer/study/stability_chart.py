@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from .drawing import COLOURS, MARKERS, log_ticks, pyplot, save
+from .methods import SHADERS
 from .stability import BOUND, TARGET, Found
-from .studies import METHODS
 
 LEAST_SHOWN = 3e-3
 """Errors below are drawn here: chance took them down."""
@@ -37,7 +37,7 @@ def draw(found: Found, folder: Path, name: str) -> None:
 def _errors(axis: Any, found: Found) -> None:
     axis.set_yscale("log")
     values, least = np.array([step.value for step in found.steps]), BOUND
-    for method in METHODS:
+    for method in SHADERS:
         if method == "path" and found.study.truth is None:
             continue
         outcomes = [step.outcome(method) for step in found.steps]

@@ -10,9 +10,10 @@ from sss_tools.errors import InputError
 from . import stability_chart
 from .drawing import write, write_csv
 from .machine import machine, sentence
+from .methods import SHADERS
 from .stability import BOUND, PROMISES_FALSE_ALARM, TARGET, Found, Step
 from .stability_bench import FAST_PASSES, FULL, QUICK, Bench, sweep
-from .studies import METHODS, Study
+from .studies import Study
 
 COLUMNS = (
     "study", "value", "method", "passes", "relative_rms_bias", "squared_bias", "squared_bias_stderr",
@@ -107,12 +108,12 @@ def _table(found: Sequence[Found]) -> list[str]:
         "all of the sweep, ~ says that noise could move an end. Degradation is gradual where no step of the sweep "
         "changes an error by more than the bound.",
         "",
-        f"| study | swept | {' | '.join(METHODS)} | `auto` leaves in time | rare events |",
-        f"|---|---|{'---|' * len(METHODS)}---|---|",
+        f"| study | swept | {' | '.join(SHADERS)} | `auto` leaves in time | rare events |",
+        f"|---|---|{'---|' * len(SHADERS)}---|---|",
     ]  # fmt: skip
     for one in found:
         cells = [f"[{one.study.name}](#{one.study.name})", one.study.axis]
-        cells += [bounds(one, method) for method in METHODS]
+        cells += [bounds(one, method) for method in SHADERS]
         broken, rare = one.broken(), one.rare()
         cells.append("yes" if not broken else f"no, {len(broken)} of {sum(len(step.choices) for step in one.steps)}")
         cells.append("within budget" if not rare else f"beyond at {_values(step.value for step, _ in rare)}")
@@ -145,7 +146,7 @@ def _study(found: Found) -> list[str]:
     study = found.study
     lines = [f"## {study.name}", "", f"{study.title} ({study.axis}.)", "",
              f"![{study.title}]({study.name}.png)", ""]  # fmt: skip
-    for method in METHODS:
+    for method in SHADERS:
         if method == "path" and study.truth is None:
             continue
         jump = found.greatest_jump(method)
@@ -188,7 +189,7 @@ def limits(found: Sequence[Found], quick: bool) -> str:
     broken = [(one, step, choice) for one in found for step, choice in one.broken()]
     lines += _promises(broken) if broken else ["Nothing: it leaves every method before it fails.", ""]
     for one in found:
-        failing = [method for method in METHODS if bounds(one, method) not in ("all", "exact")]
+        failing = [method for method in SHADERS if bounds(one, method) not in ("all", "exact")]
         if failing:
             lines += [f"## {one.study.name}", "", f"{one.study.title} Beyond 10 % somewhere: {', '.join(failing)}.",
                       "", f"![{one.study.title}]({one.study.name}.png)", ""]  # fmt: skip

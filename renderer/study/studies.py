@@ -16,8 +16,6 @@ from sss_tools.shapes import ellipsoid, icosphere, moved, punctured, slab
 
 from .case import CAMERA, MEDIUM, SKY, SUN, Case
 
-METHODS = ("path", "plumb", "scalar", "diffuse")
-
 
 @dataclass(frozen=True)
 class Study:

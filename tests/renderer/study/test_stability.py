@@ -11,9 +11,10 @@ from renderer.output import image
 from renderer.scene.scene_file import load_scene
 from renderer.study import stability_bench, studies
 from renderer.study.accuracy import Truth
+from renderer.study.methods import SHADERS
 from renderer.study.stability import Choice, Found, Outcome, Step
 from renderer.study.stability_report import bounds, rows
-from renderer.study.studies import METHODS, STUDIES, Study
+from renderer.study.studies import STUDIES, Study
 
 
 def outcome(method: str, error: float, stderr: float = 1e-6, rare: str = "") -> Outcome:
@@ -23,7 +24,7 @@ def outcome(method: str, error: float, stderr: float = 1e-6, rare: str = "") -> 
 def found(values, errors, log=True, choices=(), truth=lambda: None) -> Found:
     study = Study("a-study", "?", "x", tuple(values), lambda value: None, truth, log)
     steps = [
-        Step(value, 30.0, 100, tuple(outcome(method, error) for method in METHODS), tuple(choices), "strict", "")
+        Step(value, 30.0, 100, tuple(outcome(method, error) for method in SHADERS), tuple(choices), "strict", "")
         for value, error in zip(values, errors, strict=True)
     ]
     return Found(study, tuple(steps))
