@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import unicodedata
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
@@ -27,6 +28,12 @@ def font(size: int) -> Any:
     from PIL import ImageFont
 
     return ImageFont.load_default(size)
+
+
+def legible(text: str) -> str:
+    """The text in letters that the typeface has, which are ASCII: accents go, of other scripts question marks stay."""
+    plain = unicodedata.normalize("NFKD", text.replace("ß", "ss"))
+    return "".join(c for c in plain if not unicodedata.combining(c)).encode("ascii", "replace").decode()
 
 
 @dataclass
@@ -98,7 +105,7 @@ def _ring(draw: Any, pointer: Pointer) -> None:
 
 
 def _words(pointer: Pointer) -> str:
-    words = pointer.words + (f" x{pointer.places}" if pointer.places > 1 else "")
+    words = legible(pointer.words) + (f" x{pointer.places}" if pointer.places > 1 else "")
     return f"{pointer.letter}  {words}" if pointer.letter else words
 
 
@@ -198,7 +205,7 @@ def _draw_ramp(draw: Any, words: tuple[str, str, str, str], width: int, y: int) 
 def wrapped(text: str, width: float, size: int) -> list[str]:
     """The text in rows that fit ``width`` pixels."""
     rows, row = [], ""
-    for word in text.split():
+    for word in legible(text).split():
         longer = f"{row} {word}".strip()
         if font(size).getlength(longer) > width and row:
             rows.append(row)
@@ -213,7 +220,7 @@ def titled(image: NDArray[np.uint8], words: str, colour: Colour, dots=()) -> NDA
     from PIL import Image, ImageDraw
 
     picture = Image.fromarray(image)
-    draw = ImageDraw.Draw(picture)
+    draw, words = ImageDraw.Draw(picture), legible(words)
     height, width = image.shape[:2]
     for x, y in dots:
         draw.ellipse((x - 5, y - 5, x + 5, y + 5), colour, (255, 255, 255), 2)
