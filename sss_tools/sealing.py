@@ -88,6 +88,29 @@ class _Cap:
     corners: Float64
     triangles: Indices
 
+    @property
+    def width(self) -> float:
+        """The longest side of its box."""
+        return float(np.ptp(self.corners, axis=0).max())
+
+    @property
+    def vectors(self) -> Float64:
+        """(t, 3) along each triangle's normal, twice its area long."""
+        a, b, c = (self.corners[self.triangles[:, side]] for side in range(3))
+        return np.cross(b - a, c - a)
+
+    @property
+    def centroid(self) -> Float64:
+        """(3,) of its surface; zero where it has no area."""
+        areas = np.linalg.norm(self.vectors, axis=1)
+        return areas @ self.corners[self.triangles].mean(axis=1) / max(areas.sum(), 1e-300)
+
+    @property
+    def normal(self) -> Float64:
+        """(3,) unit mean normal; zero where it has none."""
+        total = self.vectors.sum(axis=0)
+        return total / max(float(np.linalg.norm(total)), 1e-300)
+
 
 def seal(mesh: Mesh, caps: bool = True) -> Sealed:
     """The mesh with its solids turned outwards and, where ``caps`` says so, caps on the loops that can have one.
@@ -178,7 +201,7 @@ def _crossing(body: Mesh, caps: list[_Cap | None]) -> tuple[NDArray[np.bool_], b
     first, second = owner[pairs[own]].T
     crosses[first[second < 0]] = crosses[second[first < 0]] = True
     crosses &= _folded_share(whole, owner, pairs[own], len(caps)) > FOLD
-    size = [0.0 if cap is None else _width(cap) for cap in caps]
+    size = [0.0 if cap is None else cap.width for cap in caps]
     for one, other in zip(first.tolist(), second.tolist(), strict=True):
         if one >= 0 and other >= 0 and one != other and not (crosses[one] or crosses[other]):
             crosses[max(one, other, key=size.__getitem__)] = True
@@ -224,39 +247,28 @@ def _apart(draft: Draft, caps: list[_Cap | None]) -> list[_Cap | None]:
     flat = [(k, cap) for k, cap in enumerate(caps) if cap is not None and len(cap.corners) == len(cap.loop) > 3]
     for one, other in combinations(flat, 2):
         if of_point[one[1].loop[0]] != of_point[other[1].loop[0]] and _coincide(one[1], other[1]):
-            place, smaller = min(one, other, key=lambda pair: _width(pair[1]))
+            place, smaller = min(one, other, key=lambda pair: pair[1].width)
             bulged = _bulged(smaller)
             if not _crossing(draft.mesh, [bulged])[0][0]:
                 caps[place] = bulged
     return caps
 
 
-def _width(cap: _Cap) -> float:
-    """The longest side of its box."""
-    return float(np.ptp(cap.corners, axis=0).max())
-
-
 def _coincide(one: _Cap, other: _Cap) -> bool:
     """Whether two flat caps lie in one plane, as far as rays can tell, with boxes that overlap."""
     lower = np.maximum(one.corners.min(axis=0), other.corners.min(axis=0))
     upper = np.minimum(one.corners.max(axis=0), other.corners.max(axis=0))
-    width = max(_width(one), _width(other))
+    width = max(one.width, other.width)
     if (lower > upper + BULGE * width).any():
         return False
-    a, b, c = (one.corners[one.triangles[:, side]] for side in range(3))
-    normal = np.cross(b - a, c - a).sum(axis=0)
-    normal /= max(float(np.linalg.norm(normal)), 1e-300)
-    heights = (np.concatenate([one.corners, other.corners]) - one.corners.mean(axis=0)) @ normal
+    heights = (np.concatenate([one.corners, other.corners]) - one.corners.mean(axis=0)) @ one.normal
     return bool(np.abs(heights).max() < BULGE * width / 2)
 
 
 def _bulged(cap: _Cap) -> _Cap:
     """A fan from the middle of a flat cap's loop, moved outwards by ``BULGE`` of its width."""
-    a, b, c = (cap.corners[cap.triangles[:, side]] for side in range(3))
-    normal = np.cross(b - a, c - a).sum(axis=0)
-    normal /= max(float(np.linalg.norm(normal)), 1e-300)
     count = len(cap.loop)
-    apex = cap.corners.mean(axis=0) + BULGE * _width(cap) * normal
+    apex = cap.corners.mean(axis=0) + BULGE * cap.width * cap.normal
     start = np.arange(count)
     fan = np.stack([start, (start + 1) % count, np.full(count, count)], axis=1)
     return _Cap(cap.loop, np.concatenate([cap.corners, apex[None]]), fan)
@@ -275,28 +287,18 @@ def _seen_from_inside(body: Mesh, caps: list[_Cap | None], measures: list) -> li
     The room behind a cap reaches from its middle, straight in, to the next surface: in a ball that is its diameter.
     """
     frame = UnitFrame.around(*body.bounds)
-    which = [k for k, cap in enumerate(caps) if cap is not None]
-    vectors, middles = [], []
-    for k in which:
-        a, b, c = (caps[k].corners[caps[k].triangles[:, side]] for side in range(3))  # type: ignore[union-attr]
-        normals = np.cross(b - a, c - a)
-        areas = np.linalg.norm(normals, axis=1)
-        vectors.append(normals.sum(axis=0))
-        middles.append(areas @ ((a + b + c) / 3) / max(areas.sum(), 1e-300))
-    size = np.linalg.norm(vectors, axis=1) if which else np.zeros(0)
-    which = [k for k, each in zip(which, size, strict=True) if each > 0]
-    if not which:
+    faced = [(k, cap) for k, cap in enumerate(caps) if cap is not None and cap.normal.any()]
+    if not faced:
         return measures
-    inwards = -np.array(vectors)[size > 0] / size[size > 0, None]
-    centre = np.array(middles)[size > 0]
+    inwards = -np.array([cap.normal for _, cap in faced])
+    centre = np.array([cap.centroid for _, cap in faced])
     inside = frame.points_in(centre) + _AWAY * inwards
     distance, hit = RayCaster(frame.points_in(body.vertices), body.faces).closest(
         np.ascontiguousarray(inside.T, np.float32), np.ascontiguousarray(inwards.T, np.float32)
     )
     measures = list(measures)
-    for n, k in enumerate(which):
-        cap, radius = caps[k], measures[k][2]
-        assert cap is not None
+    for n, (k, cap) in enumerate(faced):
+        radius = measures[k][2]
         if hit[n] >= 0:
             radius = float(distance[n] + _AWAY) * frame.scale / 2
         place = centre[n] + radius * inwards[n]
