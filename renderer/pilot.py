@@ -12,7 +12,7 @@ noise, its own standard error, is taken for bias: a pilot never says better than
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import cast
 
 import numpy as np
@@ -69,18 +69,17 @@ def pilot(scene: Scene, index: int, settings: Settings, passes: int | None = Non
     side = int(np.clip(np.ceil(appearance(scene, thing).size_px * FRAME), LEAST_SIDE, SIDE))
     view = replace(scene, camera=_looking_at(scene.camera, thing, side), hash="")
     more = min((SIDE / side) ** 2, MOST_PASSES / PASSES)
-    halves, noise = _halves(view, index, "path", settings, int((passes or PASSES) * more))
-    where = halves.pop()
+    exact = _halves(view, index, "path", settings, int((passes or PASSES) * more))
+    where = exact.where
     if where.sum() < 2:
         return None
-    mean = float(np.mean([half[where].mean() for half in halves]))
-    mean = max(mean, 1e-12)
+    mean = max(float((exact.first[where].mean() + exact.second[where].mean()) / 2), 1e-12)
     errors = {}
     for name in CHEAPEST_FIRST[:-1]:
-        (first, second, _), _ = _halves(view, index, name, settings, int(FAST_PASSES * more))
-        products = ((halves[0] - first) * (halves[1] - second))[where]
+        fast = _halves(view, index, name, settings, int(FAST_PASSES * more))
+        products = ((exact.first - fast.first) * (exact.second - fast.second))[where]
         errors[name] = _relative(products, mean)
-    noise = float(noise / mean)
+    noise = exact.noise / mean
     return Measured(errors, Error(noise, noise))
 
 
@@ -93,9 +92,23 @@ def _relative(products: NDArray[np.float64], mean: float) -> Error:
     return Error(bias, max(bound, bias))
 
 
-def _halves(scene: Scene, index: int, shader: str, settings: Settings, passes: int) -> tuple[list[NDArray], float]:
-    """Two independent means (h, w, 3) of so many passes each and the pixels that show nothing but the object, or if
-    there are few, those whose middle shows it; and the standard deviation of a sample there, root mean square."""
+@dataclass(frozen=True, eq=False)
+class _Halves:
+    """Two independent pictures of one shader.
+
+    first, second  (h, w, 3) means
+    where          (h, w) pixels that show nothing but the object, or if there are few, those whose middle shows it
+    noise          standard deviation of a sample there, root mean square
+    """
+
+    first: NDArray[np.float64]
+    second: NDArray[np.float64]
+    where: NDArray[np.bool_]
+    noise: float
+
+
+def _halves(scene: Scene, index: int, shader: str, settings: Settings, passes: int) -> _Halves:
+    """The pictures, of so many passes each."""
     # diffuse is no wish of users
     lit = replace(scene.objects[index], shader=cast(ShaderChoice, shader))
     objects = tuple(lit if k == index else _out_of_the_way(thing) for k, thing in enumerate(scene.objects))
@@ -110,7 +123,8 @@ def _halves(scene: Scene, index: int, shader: str, settings: Settings, passes: i
     if where.sum() < _FEW_PIXELS:
         where = renderer.object_id == index
     variance = films[0].stderr()[where] ** 2 * passes
-    return [*(film.mean() for film in films), where], float(np.sqrt(variance.mean())) if variance.size else 0.0
+    noise = float(np.sqrt(variance.mean())) if variance.size else 0.0
+    return _Halves(films[0].mean(), films[1].mean(), where, noise)
 
 
 def _out_of_the_way(thing: SceneObject) -> SceneObject:
