@@ -62,13 +62,14 @@ def damaged(seed: int, number: int) -> tuple[str, str, bytes]:
     other = chance.choice([content for name, (end, content) in valid_files().items() if end == suffix])
     inner = chance.random() < 0.5
     if inner and suffix == ".3mf":
-        return kind, suffix, _damaged_zip(data, chance)
+        return kind, suffix, damaged_zip(data, chance)
     if inner and suffix == ".glb":
         return kind, suffix, _damaged_glb(data, chance)
-    return kind, suffix, _several(data, other, chance)
+    return kind, suffix, damaged_in_places(data, other, chance)
 
 
-def _several(data: bytes, other: bytes, chance: random.Random) -> bytes:
+def damaged_in_places(data: bytes, other: bytes, chance: random.Random) -> bytes:
+    """The bytes damaged once to eight times; pieces of ``other`` may come in."""
     for _ in range(chance.choice((1, 1, 1, 2, 3, 8))):
         data = chance.choice(_DAMAGES)(data, other, chance)
     return data
@@ -137,21 +138,21 @@ def _range(data: bytes, chance: random.Random) -> tuple[int, int]:
     return chance.randrange(len(data) + 1), chance.choice((1, 2, 4, 12, 50, 200))
 
 
-def _damaged_zip(data: bytes, chance: random.Random) -> bytes:
+def damaged_zip(data: bytes, chance: random.Random) -> bytes:
     """One member damaged, the archive sound: damage from outside stops at its checksums."""
     source, target = zipfile.ZipFile(io.BytesIO(data)), io.BytesIO()
     victim = chance.choice(source.namelist())
     with zipfile.ZipFile(target, "w") as archive:
         for name in source.namelist():
             content = source.read(name)
-            archive.writestr(name, _several(content, content, chance) if name == victim else content)
+            archive.writestr(name, damaged_in_places(content, content, chance) if name == victim else content)
     return target.getvalue()
 
 
 def _damaged_glb(data: bytes, chance: random.Random) -> bytes:
     """The description damaged, the lengths sound."""
     length = struct.unpack("<I", data[12:16])[0]
-    text = _several(data[20 : 20 + length], data[20 : 20 + length], chance)
+    text = damaged_in_places(data[20 : 20 + length], data[20 : 20 + length], chance)
     text += b" " * (-len(text) % 4)
     rest = data[20 + length :]
     total = 20 + len(text) + len(rest)

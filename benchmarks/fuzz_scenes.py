@@ -17,8 +17,9 @@ from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
-from fuzz_inputs import _damaged_zip, _several
-from hostile_inputs import _CAMERA, _LIGHT, _OBJECT, part, png, put, scene
+from fuzz_inputs import damaged_in_places, damaged_zip
+from hostile_inputs import png, put
+from hostile_scenes import CAMERA, LIGHT, OBJECT, part, scene
 
 BATCH = 25
 SECONDS = 20
@@ -63,7 +64,7 @@ def valid() -> dict[str, tuple[str, bytes]]:
         np.save(npy, pixels)
         np.savez_compressed(npz, image=pixels)
         return {
-            "scene": (".toml", (_CAMERA + _LIGHT + _OBJECT + _SCENE).encode()),
+            "scene": (".toml", (CAMERA + LIGHT + OBJECT + _SCENE).encode()),
             "part": (".npz", film),
             "sky-exr": (".exr", exr.read_bytes()),
             "sky-jpg": (".jpg", jpeg.getvalue()),
@@ -80,8 +81,8 @@ def damaged(seed: int, number: int) -> tuple[str, str, bytes]:
     kind = kinds[number % len(kinds)]
     suffix, data = valid()[kind]
     if suffix == ".npz" and chance.random() < 0.7:
-        return kind, suffix, _damaged_zip(data, chance)
-    return kind, suffix, _several(data, data, chance)
+        return kind, suffix, damaged_zip(data, chance)
+    return kind, suffix, damaged_in_places(data, data, chance)
 
 
 def outcomes(seed: int, numbers: range) -> tuple[list[tuple[str, str]], int]:
@@ -146,7 +147,7 @@ def _read(kind: str, suffix: str, data: bytes) -> str:
         path = put(folder / f"a{suffix}", data)
         if kind.startswith("sky"):
             light = f'[[light]]\ntype = "environment"\nimage = "{path.name}"\n'
-            path = scene(folder, _CAMERA + light + _OBJECT)
+            path = scene(folder, CAMERA + light + OBJECT)
         elif kind == "scene":
             path = scene(folder, "")
             path.write_bytes(data)

@@ -24,7 +24,8 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from hostile_inputs import _CAMERA, _OBJECT, ATTACKS, MIB, Attack, part, put, scene
+from hostile_inputs import ATTACKS, MIB, Attack, put
+from hostile_scenes import CAMERA, OBJECT, part, scene
 
 SECONDS = 20.0
 MEMORY = 2 * 2**30
@@ -132,7 +133,7 @@ def warm_up(folder: Path) -> None:
     )
     for suffix in ("png", "jpg", "exr"):
         light = f'[[light]]\ntype = "environment"\nimage = "sky.{suffix}"\n'
-        assert read_scene(scene(folder, _CAMERA + light + _OBJECT)) == 0
+        assert read_scene(scene(folder, CAMERA + light + OBJECT)) == 0
     assert read_part(part(folder)) == 0
     for bad in ("bad.toml", "bad.png"):  # the ways of errors
         read_scene(put(folder / bad, "x"))

@@ -22,7 +22,7 @@ def fuzz(monkeypatch):
     import fuzz
 
     yield fuzz
-    for name in ("fuzz", "fuzz_inputs", "fuzz_scenes", "hostile", "hostile_inputs"):
+    for name in ("fuzz", "fuzz_inputs", "fuzz_scenes", "hostile", "hostile_inputs", "hostile_scenes"):
         sys.modules.pop(name, None)
 
 

@@ -67,7 +67,7 @@ def test_the_judge_of_hostile_files_can_find_fault(monkeypatch):
         ):  # fmt: skip
             assert hostile.faults(attack, replace(good, **change)), change
     finally:
-        for name in ("hostile", "hostile_inputs"):
+        for name in ("hostile", "hostile_inputs", "hostile_scenes"):
             sys.modules.pop(name, None)
 
 
