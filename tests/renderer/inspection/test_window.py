@@ -72,6 +72,14 @@ class Driver:
         )
         self.lines: list[str] = []
 
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        if self.process.poll() is None:
+            self.process.kill()
+        self.process.communicate()
+
     def wait_for(self, words: str, seconds: float = 120) -> str:
         """The first line from now on that has these words."""
         assert self.process.stdout is not None
@@ -98,8 +106,7 @@ class Driver:
 def test_keys_go_from_finding_to_finding_and_a_click_asks_a_face(screen, tmp_path):
     path = tmp_path / "ball.ply"
     write_mesh(shapes.inverted(shapes.punctured(shapes.icosphere(1.0, 3), [[0, 0, 1], [1, 0, 0]], 0.25)), path)
-    window = Driver(screen, str(path), "-q")
-    try:
+    with Driver(screen, str(path), "-q") as window:
         assert "vtkXOpenGLRenderWindow" in window.wait_for("open")
         time.sleep(1)
         window.hand("mousemove", "600", "425")
@@ -115,10 +122,6 @@ def test_keys_go_from_finding_to_finding_and_a_click_asks_a_face(screen, tmp_pat
         assert "SSS204 inverted-shell" in window.wait_for("face ")
         window.hand("key", "q")
         assert window.process.wait(60) == 0
-    finally:
-        if window.process.poll() is None:
-            window.process.kill()
-        window.process.communicate()
 
 
 def test_the_live_picture_turns_under_the_mouse_and_rests_on_the_reference(screen, tmp_path):
@@ -138,8 +141,7 @@ LiveWindow._tell = tell
     )
     # two millimetres of ketchup: few collisions, and passes take a fraction of a second
     look = [str(path), "--live", "--size", "500x400", "--material", "ketchup", "--unit", "mm", "-q"]
-    window = Driver(screen, *look, code=live)
-    try:
+    with Driver(screen, *look, code=live) as window:
         window.wait_for("ready")
         first = window.wait_for("standard error")
         window.hand("mousemove", "240", "240")
@@ -154,10 +156,6 @@ LiveWindow._tell = tell
         assert len(set(places)) == 3
         window.hand("key", "q")
         assert window.process.wait(60) == 0
-    finally:
-        if window.process.poll() is None:
-            window.process.kill()
-        window.process.communicate()
 
 
 def test_without_a_screen_the_command_says_so_in_one_line(tmp_path):
