@@ -32,6 +32,31 @@ FAINT = 0.125
 cost a third of the frame for a few percent of its light."""
 
 
+@dataclass(frozen=True)
+class _Arrival:
+    """Paths that meet a body.
+
+    index             (n,) which
+    position          (3, n) where
+    direction         (3, n) of their flight
+    facing, normal    (3, n) the triangle's normal and the shading normal, on their side
+    """
+
+    index: NDArray[np.intp]
+    position: Float32
+    direction: Float32
+    facing: Float32
+    normal: Float32
+
+    @classmethod
+    def of(cls, scene: TracedScene, paths: Paths, index: NDArray[np.intp], triangle: NDArray[np.int32]) -> _Arrival:
+        """Of the paths ``index``, which stand on ``triangle`` (n,)."""
+        geometric = np.take(scene.triangle_normal, triangle, axis=1)
+        direction, position = paths.direction[:, index], paths.origin[:, index]
+        side = -np.copysign(np.float32(1), np.einsum("ij,ij->j", direction, geometric))
+        return cls(index, position, direction, geometric * side, scene.shading_normal(position, triangle) * side)
+
+
 @dataclass
 class FastBody:
     """An object with the shader module (plumb, scalar or diffuse) that lights it.
@@ -59,12 +84,9 @@ class FastBody:
         radiance: Float32,
     ) -> None:
         """Add the body's scattered light to the paths ``index`` that meet it, and send them on by reflection."""
-        geometric = np.take(scene.triangle_normal, triangle, axis=1)
-        direction, position = paths.direction[:, index], paths.origin[:, index]
-        side = -np.copysign(np.float32(1), np.einsum("ij,ij->j", direction, geometric))
-        facing, normal = geometric * side, scene.shading_normal(position, triangle) * side
-        view_cosine = np.clip(-np.einsum("ij,ij->j", direction, normal), np.float32(1e-4), 1)
-        points = self._points(scene, position, normal, triangle, -direction)
+        at = _Arrival.of(scene, paths, index, triangle)
+        view_cosine = np.clip(-np.einsum("ij,ij->j", at.direction, at.normal), np.float32(1e-4), 1)
+        points = self._points(scene, at.position, at.normal, triangle, -at.direction)
         exitance = self.exitance(scene, points, paths.throughput[:, index].max(axis=0), beams)
         leaving = outgoing_radiance(exitance, view_cosine, self.optics.ior)
         radiance[:, paths.sample[index]] += paths.throughput[:, index] * leaving
@@ -75,10 +97,9 @@ class FastBody:
         elif self.thing.roughness == 0:
             reflectance, _ = fresnel_reflectance(view_cosine, eta)
             paths.throughput[:, index] *= reflectance
-            turned = direction + 2 * view_cosine * normal
-            self._send_on(paths, index, position, facing, turned)
+            self._send_on(paths, at, at.direction + 2 * view_cosine * at.normal)
         else:
-            self._reflect_rough(scene, paths, index, position, normal, facing, eta, uniforms, tally, radiance)
+            self._reflect_rough(scene, paths, at, uniforms, tally, radiance)
 
     def exitance(
         self, scene: TracedScene, points: SurfacePoints, throughput: Float32, beams: Sequence[Beam]
@@ -102,21 +123,23 @@ class FastBody:
         ambient = None if self.ambient is None else np.einsum("ij,jik->kj", weights, self.ambient[face])
         return SurfacePoints(position, normal, curvature, viewer, ambient)
 
-    def _reflect_rough(self, scene, paths, index, position, normal, facing, eta, uniforms, tally, radiance) -> None:
+    def _reflect_rough(
+        self, scene: TracedScene, paths: Paths, at: _Arrival, uniforms: Uniforms, tally: Tally, radiance: Float32
+    ) -> None:
         """The reflecting half of the GGX boundary, with the highlights of lights."""
-        alpha = self.thing.roughness
-        frame = LocalFrame(normal)
-        view = frame.to_local(-paths.direction[:, index])
+        index, alpha, eta = at.index, self.thing.roughness, self.optics.ior
+        frame = LocalFrame(at.normal)
+        view = frame.to_local(-at.direction)
         view[2] = np.maximum(view[2], np.float32(1e-4))
-        for light in arriving(scene, position, lambda: uniforms.draw_at(paths.stream, index), skies=True):
+        for light in arriving(scene, at.position, lambda: uniforms.draw_at(paths.stream, index), skies=True):
             to_light = frame.to_local(light.direction)
             drawn, share = turning(view, to_light, eta, alpha)
-            above = (to_light[2] > 0) & (np.einsum("ij,ij->j", facing, light.direction) > 0)
+            above = (to_light[2] > 0) & (np.einsum("ij,ij->j", at.facing, light.direction) > 0)
             value = np.where(above, drawn * share * unmasked(to_light[2], alpha), 0)
             lit, weight = worthwhile(paths, index, light, value, drawn, uniforms)
             if len(lit):
                 who = index[lit]
-                arrived = received(scene, position[:, lit], facing[:, lit], pick(light, lit),
+                arrived = received(scene, at.position[:, lit], at.facing[:, lit], pick(light, lit),
                                    paths.inside[:, who], paths.owner[who], tally)  # fmt: skip
                 radiance[:, paths.sample[who]] += paths.throughput[:, who] * arrived * weight
         u1, u2 = uniforms.draw_at(paths.stream, index)
@@ -126,18 +149,18 @@ class FastBody:
         turned = 2 * cos_in * facet - view
         weight = np.where(turned[2] > 0, reflectance * unmasked(turned[2], alpha), 0)
         paths.throughput[:, index] *= weight
-        self._send_on(paths, index, position, facing, frame.to_world(turned))
+        self._send_on(paths, at, frame.to_world(turned))
         if scene.lights.sampled:
             drawn, _ = turning(view, turned, eta, alpha)
             paths.density[index] = np.where(drawn > 0, drawn, np.inf)
             paths.flown[index] = 0
 
     @staticmethod
-    def _send_on(paths: Paths, index: NDArray[np.intp], position: Float32, facing: Float32, turned: Float32) -> None:
-        keep_outside(turned, facing)
-        paths.direction[:, index] = turned
-        paths.origin[:, index] = offset_from(position, facing, np.ones(len(index), np.float32))
-        paths.density[index] = np.inf
+    def _send_on(paths: Paths, at: _Arrival, turned: Float32) -> None:
+        keep_outside(turned, at.facing)
+        paths.direction[:, at.index] = turned
+        paths.origin[:, at.index] = offset_from(at.position, at.facing, np.ones(len(at.index), np.float32))
+        paths.density[at.index] = np.inf
 
 
 def keep_outside(turned: Float32, facing: Float32) -> None:
