@@ -130,24 +130,79 @@ def measure(
 
     Raises InputError for a scene that cannot be rendered.
     """
-    spent = 0.0
-    without_peer = None if peer else "not installed"
+    measurement = _Measurement(lab, scene, source, effort, remaining, None if peer else "not installed")
+    first = measurement.first_turn()
+    reference = measurement.reference(first)
+    runs = [*first, *measurement.further_turns(first)]
+    without_peer = measurement.without_peer
+    if without_peer is not None:
+        runs = [one for one in runs if one.task.method != "mitsuba"]
+    return judged(lab, scene, source, runs, reference, without_peer)
 
-    def run(task: Task, left: float | None = None) -> Run:
-        nonlocal spent
-        remaining(max(effort.seconds - spent, 0.0) if left is None else left)
-        done = lab.run(task)
-        spent += done.seconds
-        return done
 
-    def task(method: str, passes: int, turn: int, quality: float | None = None) -> Task:
-        return Task(scene, source, method, passes, turn, 1 + turn, quality)
+@dataclass
+class _Measurement:
+    """The runs of a scene, as they are made.
 
-    def climb(method: str) -> list[Run]:
+    without_peer  why Mitsuba takes no part, or None
+    spent         seconds so far
+    """
+
+    lab: Lab
+    scene: str
+    source: str
+    effort: Effort
+    remaining: Callable[[float], None]
+    without_peer: str | None
+    spent: float = 0.0
+
+    def first_turn(self) -> list[Run]:
+        """Every sweep once: how far each goes is found out by the way."""
+        runs = self._climb("path")
+        for method in FAST:
+            runs += self._climb(method)
+        passes = _auto_passes(runs, self.effort)
+        runs += [self._run(self._task("auto", passes, 0, quality)) for quality in self.effort.qualities]
+        if self.without_peer is None:
+            try:
+                runs += self._climb("mitsuba")
+            except PeerFailed as words:
+                self._leave_peer_out(words)
+        return runs
+
+    def reference(self, first: Sequence[Run]) -> tuple[Run, Run]:
+        """The exact halves that everything is judged by, as long as their share of the time lasts."""
+        longest = [one for one in first if one.task.method == "path"][-1]
+        share = REFERENCE_SHARE * self.effort.seconds
+        each = share / 2 - (longest.seconds - longest.render)
+        count = max(int(each / longest.render * longest.task.passes), STEP)
+        later = (self.effort.turns - 1) * sum(one.seconds for one in first)
+        one, two = (
+            self._run(Task(self.scene, self.source, "reference", count, half, seed), (2 - half) * share / 2 + later)
+            for half, seed in enumerate(REFERENCE_SEEDS)
+        )
+        return one, two
+
+    def further_turns(self, first: Sequence[Run]) -> list[Run]:
+        """The same runs again with other seeds, each method after the other and in reversed order every other time."""
+        runs = []
+        left = (self.effort.turns - 1) * sum(one.seconds for one in first)
+        for turn in range(1, self.effort.turns):
+            for known in first[:: -1 if turn % 2 else 1]:
+                one = known.task
+                try:
+                    if one.method != "mitsuba" or self.without_peer is None:
+                        runs.append(self._run(self._task(one.method, one.passes, turn, one.quality), left))
+                except PeerFailed as words:
+                    self._leave_peer_out(words)
+                left -= known.seconds
+        return runs
+
+    def _climb(self, method: str) -> list[Run]:
         """The first turn of a sweep."""
-        allotted = SHARES[method] * effort.seconds / effort.turns
+        allotted = SHARES[method] * self.effort.seconds / self.effort.turns
         most = MOST_FAST_PASSES if method in FAST else 2**30
-        runs = [run(task(method, 1, 0))]
+        runs = [self._run(self._task(method, 1, 0))]
         while True:
             setup, render = runs[-1].seconds - runs[-1].render, runs[-1].render
             step = LONG_STEP if method in FAST or LONG_STEP * render < setup else STEP
@@ -156,44 +211,20 @@ def measure(
             late = sum(one.seconds for one in runs) + expected > allotted
             if passes > most or (late and len(runs) >= LEAST_POINTS):
                 return runs
-            runs.append(run(task(method, passes, 0)))
+            runs.append(self._run(self._task(method, passes, 0)))
 
-    first: list[Run] = climb("path")
-    for method in FAST:
-        first += climb(method)
-    passes = _auto_passes(first, effort)
-    first += [run(task("auto", passes, 0, quality)) for quality in effort.qualities]
-    if peer:
-        try:
-            first += climb("mitsuba")
-        except PeerFailed as words:
-            without_peer = f"it failed: {words}"
-            first = [one for one in first if one.task.method != "mitsuba"]
+    def _task(self, method: str, passes: int, turn: int, quality: float | None = None) -> Task:
+        return Task(self.scene, self.source, method, passes, turn, 1 + turn, quality)
 
-    longest = [one for one in first if one.task.method == "path"][-1]
-    each = REFERENCE_SHARE * effort.seconds / 2 - (longest.seconds - longest.render)
-    count = max(int(each / longest.render * longest.task.passes), STEP)
-    further = [one.task for one in first]
-    later = sum(one.seconds for one in first)
-    halves = []
-    for half, seed in enumerate(REFERENCE_SEEDS):
-        left = (2 - half) * REFERENCE_SHARE / 2 * effort.seconds + (effort.turns - 1) * later
-        halves.append(run(Task(scene, source, "reference", count, half, seed), left))
+    def _run(self, task: Task, left: float | None = None) -> Run:
+        """Made or known; ``left`` seconds remain before it, None: what was not spent of the effort."""
+        self.remaining(max(self.effort.seconds - self.spent, 0.0) if left is None else left)
+        done = self.lab.run(task)
+        self.spent += done.seconds
+        return done
 
-    runs = list(first)
-    expected_of = {one.task.name: one.seconds for one in first}
-    left = (effort.turns - 1) * later
-    for turn in range(1, effort.turns):
-        for one in further[:: -1 if turn % 2 else 1]:
-            left -= expected_of[one.name]
-            try:
-                if one.method != "mitsuba" or without_peer is None:
-                    runs.append(run(task(one.method, one.passes, turn, one.quality), left + expected_of[one.name]))
-            except PeerFailed as words:
-                without_peer = f"it failed: {words}"
-    if without_peer is not None:
-        runs = [one for one in runs if one.task.method != "mitsuba"]
-    return judged(lab, scene, source, runs, (halves[0], halves[1]), without_peer)
+    def _leave_peer_out(self, words: PeerFailed) -> None:
+        self.without_peer = f"it failed: {words}"
 
 
 def _auto_passes(first: Sequence[Run], effort: Effort) -> int:
