@@ -90,7 +90,7 @@ def _pointers(exhibit, view, size, depth, chosen, clip) -> list[Pointer]:
             continue
         pointers.append(
             Pointer(
-                x, y, radius, spot.code, spot.colour, _is_hidden(exhibit, view, k, spot, away, depth[int(y), int(x)]),
+                x, y, radius, spot.code, spot.colour, _is_hidden(exhibit, k, away, depth[int(y), int(x)]),
                 spot.places, _letter(chosen.index(k)) if k in chosen else "",
                 quiet=several and (spot.waived or (spot.severity == Severity.INFO and not exhibit.inside[k])),
             )
@@ -102,8 +102,8 @@ def _pointers(exhibit, view, size, depth, chosen, clip) -> list[Pointer]:
     return pointers
 
 
-def _is_hidden(exhibit: Exhibit, view: Viewpoint, k: int, spot: Spot, away: float, depth: float) -> bool:
-    return bool(exhibit.inside[k]) or away > depth + spot.radius + 0.01
+def _is_hidden(exhibit: Exhibit, k: int, away: float, depth: float) -> bool:
+    return bool(exhibit.inside[k]) or away > depth + exhibit.spots[k].radius + 0.01
 
 
 def _cut(exhibit: Exhibit, spot: Spot, clip: Clip | None) -> bool:
