@@ -17,6 +17,7 @@ from sss_tools.writing import write_mesh
 
 NO_GL = ("libEGL.so.1", "libEGL.so", "libGL.so.1", "libGL.so", "libOSMesa.so", "libOSMesa.so.8", "libOSMesa.so.6",
          "libGLX.so.0", "libOpenGL.so.0")  # fmt: skip
+SMALL_STILL = ("--screenshot", "a.png", "--size", "500x400")
 
 
 @pytest.fixture
@@ -53,22 +54,22 @@ def test_the_command_survives_a_machine_without_gl(holes, start):
     folder.mkdir()
     for name in NO_GL:
         (folder / name).write_text("no library")
-    code = "from cli.sss_inspect import main; raise SystemExit(main(['holes.ply', '--screenshot', 'a.png']))"
+    code = "import sys; from cli.sss_inspect import main; sys.exit(main(sys.argv[1:]))"
     before = os.environ.get("LD_LIBRARY_PATH")
     os.environ["LD_LIBRARY_PATH"] = str(folder.resolve())
     try:
-        process = start(code)
+        process = start(code, "holes.ply", *SMALL_STILL)
     finally:
         os.environ.pop("LD_LIBRARY_PATH")
         if before is not None:
             os.environ["LD_LIBRARY_PATH"] = before
     _, error = process.communicate()
     assert process.returncode == 0, error
-    assert Image.open("a.png").size == (1400, 1000)
+    assert Image.open("a.png").size == (500, 400)
 
 
 def test_a_rule_by_name_is_all_that_is_shown(holes, by_rays, capsys):
-    assert sss_inspect.main(["holes.ply", "--rule", "inverted-shell", "--screenshot", "a.png"]) == 0
+    assert sss_inspect.main(["holes.ply", "--rule", "inverted-shell", *SMALL_STILL]) == 0
     assert "0 findings in 0 places" in capsys.readouterr().out
 
 
@@ -149,7 +150,7 @@ def test_faces_with_finite_corners_are_drawn_where_others_are_not(workplace, by_
     vertices = ball.vertices.copy()
     vertices[3] = np.nan
     write_mesh(Mesh(vertices, ball.faces), "nan.ply")
-    assert sss_inspect.main(["nan.ply", "--screenshot", "a.png", "-q"]) == 0
+    assert sss_inspect.main(["nan.ply", *SMALL_STILL, "-q"]) == 0
 
 
 REFUSALS = {

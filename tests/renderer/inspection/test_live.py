@@ -8,13 +8,20 @@ import pytest
 
 from renderer.inspection.live import LEAST, Live
 from renderer.render import Renderer, Settings
+from renderer.scene.description import Scene
 from renderer.scene.staging import stage_mesh
 from sss_tools import shapes
+from sss_tools.medium import Medium
+
+
+def staged() -> Scene:
+    """An ellipsoid in which light is scattered five times or so: passes are short."""
+    return stage_mesh(shapes.ellipsoid((1.0, 0.7, 0.5), 2), Medium.from_albedo(0.8, 2.0))
 
 
 @pytest.fixture
 def live():
-    made = Live(stage_mesh(shapes.ellipsoid((1.0, 0.7, 0.5), 2)), (96, 64))
+    made = Live(staged(), (96, 64))
     yield made
     made.close()
 
@@ -52,15 +59,15 @@ def test_the_preview_is_of_the_window_s_size_and_grows_no_finer_than_time_allows
 
 @pytest.mark.parametrize("preview", ["scalar", "plumb"])
 def test_the_preview_is_seen_from_where_the_camera_is(preview):
-    staged = stage_mesh(shapes.ellipsoid((1.0, 0.7, 0.5), 2))
-    turning = Live(staged, (96, 64), preview)
+    scene = staged()
+    turning = Live(scene, (96, 64), preview)
     turning._rows = 64
     before = turning.moving()
     turning.turn(0.7, 0.2)
     turning._rows = 64
     after = turning.moving()
     assert (before != after).any()
-    fresh = Live(replace(staged, camera=turning.camera), (96, 64), preview)
+    fresh = Live(replace(scene, camera=turning.camera), (96, 64), preview)
     fresh._rows = 64
     assert np.array_equal(fresh.moving(), after)
 
@@ -76,8 +83,8 @@ def test_a_movement_ends_the_film_and_the_next_is_of_the_new_camera(live):
     wait_for_passes(live, 2)
     live.close()
     film = live._exact.film
-    staged = stage_mesh(shapes.ellipsoid((1.0, 0.7, 0.5), 2))
-    again = Renderer(replace(staged, camera=replace(staged.camera, resolution=(96, 64))), Settings(shader="path"))
+    scene = staged()
+    again = Renderer(replace(scene, camera=replace(scene.camera, resolution=(96, 64))), Settings(shader="path"))
     again.look_from(live.camera)
     again.run(range(film.passes))
     # the same passes from the same camera are the same samples
