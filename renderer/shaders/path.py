@@ -67,15 +67,7 @@ class MediumWalk:
         self._albedo = media.albedo[:, slot, None]
         self._achromatic = bool((self._sigma_t == self._sigma_t[0]).all())
         self._g = media.g[slot]
-        straight = media.ior[slot] == 1
-        self._lights_sampled = scene.lights.sampled
-        self._lit_by_areas = bool(straight) and scene.lights.sampled
-        self._lit_inside = self._lit_by_areas or bool(scene.lights.points and straight)
-        self._lit_inside |= bool(scene.holds_light[:, slot].any())
-        self._lit_through_facets = any(np.float32(beams.ior) == media.ior[slot] for beams in scene.beams)
-        if self._lit_through_facets or self._lit_inside:
-            # the collisions that a jump leaves out would not be connected
-            self._jumps = None
+        self._lights_sampled, self._lit = scene.lights.sampled, scene.lit_collisions[slot]
         thing = scene.translucent[slot]
         # rounded positions on a flat side of the box are not outside
         self._centre = (thing.lower + thing.upper) / 2
@@ -102,7 +94,7 @@ class MediumWalk:
                 turned = around(paths.direction, turned)
         else:
             turned, weigh = self._turn_guided(self._guide, u_cosine, u_turn, flight)
-        if self._lit_by_areas:
+        if self._lit.areas:
             np.copyto(paths.density, self._density(slice(None), turned), where=~paths.flies_on)
         np.copyto(paths.direction, turned, where=~paths.flies_on)
         if self._achromatic:
@@ -128,10 +120,10 @@ class MediumWalk:
         paths = self.paths
         collided = ~paths.flies_on
         self.tally.collisions += int(np.count_nonzero(collided))
-        if self._lit_inside:
+        if self._lit.inside:
             index = collided.nonzero()[0]
             light_collisions(self.scene, paths, index, self.slot, self._density, self._uniforms, self.tally, radiance)
-        if self._lit_through_facets:
+        if self._lit.facets:
             index = collided.nonzero()[0]
             light_through_facets(self.scene, paths, index, self.slot, self._uniforms, self.tally, radiance)
         play_at_collisions(paths, self._uniforms)
@@ -149,7 +141,7 @@ class MediumWalk:
         paths = self.paths
         since_surface = paths.flies_on[arrived]
         paths.flown[arrived] = paths.flown[arrived] * since_surface + flight
-        if not self._lit_by_areas:
+        if not self._lit.areas:
             paths.density[arrived[~since_surface]] = np.inf
 
     def _reach(self, position: Float32) -> Float32 | None:

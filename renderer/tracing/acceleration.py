@@ -49,7 +49,7 @@ class Acceleration:
     @classmethod
     def chosen(cls, scene: TracedScene, pixels: int) -> Acceleration:
         """What pays in this scene, for pictures of so many pixels."""
-        dense = [_jumps_pay(scene, thing) for thing in scene.translucent]
+        dense = [_jumps_pay(scene, slot) for slot in range(scene.media.count)]
         grid = _grid(scene, [thing for thing, jumps in zip(scene.translucent, dense, strict=True) if jumps], pixels)
         jumps = [
             ball_jumps(thing.medium.sigma_t, thing.medium.single_scattering_albedo)
@@ -60,13 +60,12 @@ class Acceleration:
         return cls(grid, tuple(jumps), tuple(_guide(scene, thing) for thing in scene.translucent))
 
 
-def _jumps_pay(scene: TracedScene, thing: TracedObject) -> bool:
+def _jumps_pay(scene: TracedScene, slot: int) -> bool:
     """Whether a body has many collisions, and none of them is connected to a light."""
+    thing, lit = scene.translucent[slot], scene.lit_collisions[slot]
     medium = thing.medium
     assert medium is not None
-    if medium.g != 0 or not medium.is_achromatic or scene.lights.points or scene.lights.spheres:
-        return False
-    if medium.ior == 1 and scene.lights.sampled:
+    if medium.g != 0 or not medium.is_achromatic or lit.inside or lit.facets:
         return False
     mesh = scene.scene.objects[thing.index].mesh
     inradius = mesh.mean_inradius / scene.frame.scale
@@ -75,7 +74,8 @@ def _jumps_pay(scene: TracedScene, thing: TracedObject) -> bool:
 
 def _grid(scene: TracedScene, dense: list[TracedObject], pixels: int) -> DistanceGrid | None:
     """The grid around the dense bodies; any surface of the scene may be the nearest."""
-    if not dense:
+    # the grid does not know sphere lights
+    if not dense or scene.holds_sphere.any():
         return None
     walks, solids = [], []
     for thing in dense:

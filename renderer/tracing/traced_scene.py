@@ -61,6 +61,20 @@ class TracedObject:
         return self.shader == "path"
 
 
+@dataclass(frozen=True)
+class LitCollisions:
+    """How light is connected to the collisions in a medium, and not only met by its paths.
+
+    areas   sky and lights with an extent, where the boundary does not bend rays
+    inside  these, and lights without extent that stand in the medium or shine into it unbent
+    facets  lights without extent, bent by smooth facets
+    """
+
+    areas: bool
+    inside: bool
+    facets: bool
+
+
 class TracedScene:
     """Geometry, lights and materials in the unit-size frame.
 
@@ -78,6 +92,8 @@ class TracedScene:
     frame            between the frame and scene units
     beams            light without extent behind smooth boundaries, one for each object and light
     holds_light      (points, slots + 1) bool, whether the object's box holds the place of a light without extent
+    holds_sphere     (slots,) bool, whether a sphere light reaches into the object's box
+    lit_collisions   by slot
     """
 
     def __init__(self, scene: Scene, shaders: list[str], hole_handling: list[str]):
@@ -138,6 +154,22 @@ class TracedScene:
                 for slot, thing in enumerate(self.translucent):
                     within = (source.position > thing.lower) & (source.position < thing.upper)
                     row[slot] = within.all()
+
+        self.holds_sphere = np.array([self._reached_by_spheres(thing) for thing in self.translucent], bool)
+        self.lit_collisions = [self._lit_collisions(slot) for slot in range(self.media.count)]
+
+    def _reached_by_spheres(self, thing: TracedObject) -> bool:
+        centres = [sphere.center.ravel() for sphere in self.lights.spheres]
+        nearest = [np.clip(centre, thing.lower, thing.upper) for centre in centres]
+        gaps = [np.linalg.norm(centre - point) for centre, point in zip(centres, nearest, strict=True)]
+        return any(gap <= sphere.radius for gap, sphere in zip(gaps, self.lights.spheres, strict=True))
+
+    def _lit_collisions(self, slot: int) -> LitCollisions:
+        ior = self.media.ior[slot]
+        unbent = bool(ior == 1)
+        areas = unbent and self.lights.sampled
+        inside = areas or bool(unbent and self.lights.points) or bool(self.holds_light[:, slot].any())
+        return LitCollisions(areas, inside, any(np.float32(beams.ior) == ior for beams in self.beams))
 
     def _beams(self, thing: TracedObject, corners, normals, source) -> RefractedBeams:
         first = thing.first_triangle

@@ -8,6 +8,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from renderer.optics.ball_jump import BallJumps, ball_jumps
 from renderer.optics.guided_flight import Guide
+from renderer.scene.description import PointLight, SphereLight
 from renderer.shaders import boundary
 from renderer.tracing.acceleration import Acceleration
 from renderer.tracing.distance_grid import DistanceGrid
@@ -81,6 +82,22 @@ def test_options_leave_the_mean_alone(plain, name):
         assert_mean(one - other, 0, false_alarm=1e-4, detects=0.03 * other.mean())
 
 
+def lit_by_lamps(roughness: float, ior: float = 1.4, at=(1.0, 1, 3)):
+    """A dense ball, and beside it a point and a sphere that shine."""
+    ball = placed(icosphere(1, 3), translucent([0.99, 0.97, 0.93], SIGMA_T, 0.0, ior, roughness))
+    point = PointLight(np.array([-1.0, 1, 4]), np.full(3, 5.0))
+    return scene([ball], [point, SphereLight(np.array(at), 0.5, np.full(3, 5.0))], VIEW)
+
+
+def test_jumps_leave_the_mean_alone_where_lamps_shine_on_a_rough_boundary():
+    """Sees 6 %."""
+    of = lit_by_lamps(0.4)
+    plain, *_ = means(of, 6, None, 200)
+    jumping, _, tally = means(of, 7, options(of)["jumps"], 200)
+    assert tally.leaked == 0
+    assert_mean(jumping - plain, 0, false_alarm=1e-4, detects=0.06 * plain.mean())
+
+
 def test_jumps_that_forget_the_weight_are_caught(plain, monkeypatch):
     of, jump = dense(), BallJumps.jump
     monkeypatch.setattr(BallJumps, "jump", lambda *given: np.ones_like(jump(*given)))
@@ -125,6 +142,14 @@ def test_jumps_and_their_grid_are_chosen_for_dense_bright_bodies_only():
         assert chosen(other).grid is None
         assert chosen(other).jumps == (None,)
     assert chosen(dense(), pixels=16).grid is None, "a tiny picture does not pay for a grid"
+
+
+def test_paths_jump_beside_lamps_unless_their_collisions_are_lit():
+    assert chosen(lit_by_lamps(0.4)).jumps[0] is not None
+    # smooth facets bend the light of the point to the collisions; nothing bends it on its way into a matched medium
+    assert chosen(lit_by_lamps(0.0)).jumps == chosen(lit_by_lamps(0.4, ior=1.0)).jumps == (None,)
+    # a sphere that paths may meet inside
+    assert chosen(lit_by_lamps(0.4, at=(0.0, 0.9, 0.9))).grid is None
 
 
 def test_guides_are_chosen_where_absorption_shapes_the_light():
