@@ -395,7 +395,7 @@ def _render(of: Scene, case: Case, seed: int, started: float, plain: bool = Fals
         first.append(time.monotonic() - begun)
         return time.monotonic() - begun > seconds and (renderer.film.passes >= 8 or seconds == 0)
 
-    renderer.run(range(100_000), done, lambda: begun + seconds - time.monotonic())
+    renderer.run(range(100_000), done)
     tally = renderer.tally
     return renderer.film, {
         "setup": begun - started,

@@ -164,6 +164,8 @@ class Renderer:
             except Empty:
                 for index, radiance, first_object in assembly.rest():
                     self._add(index, radiance, first_object, chosen)
+                    if done is not None:
+                        done(index)
                 return False
             finally:
                 strips.stop()
