@@ -91,15 +91,15 @@ class Strips:
         self._changed = threading.Condition()
         self.stopped = self.over = self.exhausted = False
 
-    def room(self, ended: int, age: float) -> int:
-        """Paths that a tracer should have in flight.
+    def room(self, most: int, ended: int, age: float) -> int:
+        """Paths that a tracer should have in flight, who has room for ``most``.
 
         ended  of its own
         age    seconds since the oldest that is in flight was emitted
         """
         least = max(_FIRST_ROOM, len(self._pixels)) // self._tracers
         patience = max(_PATIENCE, _PATIENT_SHARE * (time.monotonic() - self._started))
-        return max(least, int(ended * (patience / max(age, patience)) ** 2))
+        return min(max(least, int(min(ended, most) * (patience / max(age, patience)) ** 3)), most)
 
     def note(self, ended: int, steps: int) -> None:
         """So many more paths have ended, and some have gone so many steps."""

@@ -90,7 +90,7 @@ class Wavefront:
             outside, inside = self._flying.count + self._standing.count, sum(walk.paths.count for walk in self._walks)
             taken = branches * outside + inside
             steps, age = self._columns.oldest(self._steps)
-            room = min(max(strips.room(self._emitted - outside - inside, age), branches), self._flying.capacity)
+            room = max(strips.room(self._flying.capacity, self._emitted - outside - inside, age), branches)
             if taken <= room * _REFILL_AT:
                 yield from self._ended()
                 ended, self._noted = self._emitted - outside - inside - self._noted, self._emitted - outside - inside

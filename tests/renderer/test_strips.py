@@ -122,13 +122,17 @@ def test_the_first_pass_is_begun_however_little_time_there_is():
 def test_few_paths_are_in_flight_at_first_and_where_one_takes_long(monkeypatch):
     clock = Clock(monkeypatch)
     of = Strips(range(100), np.arange(100), 2, 100)
-    assert of.room(0, 0) == of.room(1000, 0) == strips._FIRST_ROOM // 2
-    assert of.room(10**6, 0.5) == 10**6
-    assert strips._FIRST_ROOM // 2 < of.room(10**6, 4) < 10**6 / 10
-    clock.now += 8
-    assert of.room(10**6, 4) == 10**6
-    # a whole pass in any case
-    assert Strips(range(100), np.arange(10**5), 2, 100).room(0, 0) == 50_000
+    most = 10**5
+    assert of.room(most, 0, 0) == of.room(most, 1000, 0) == strips._FIRST_ROOM // 2
+    assert of.room(most, 10**4, 0.5) == 10**4 and of.room(most, 10**6, 0.5) == most
+    assert of.room(most, 10**6, 4) == strips._FIRST_ROOM // 2
+    clock.now += 4
+    assert strips._FIRST_ROOM // 2 < of.room(most, 10**6, 4) < most / 5
+    clock.now += 4
+    assert of.room(most, 10**6, 4) == most
+    # a whole pass, where there is room for it
+    of = Strips(range(100), np.arange(10**5), 2, 100)
+    assert of.room(most, 0, 0) == 50_000 and of.room(10**4, 0, 0) == 10**4
 
 
 def put(columns: Columns, number: int, pixels: int, step: int = 0) -> Strip:
