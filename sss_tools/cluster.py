@@ -14,12 +14,9 @@ from collections.abc import Generator, Iterator, Sequence
 from itertools import islice
 from pathlib import Path
 
-from .errors import InputError
+from .scheduler import connected
 from .validation.outcome import MeshReport
 from .worker import Check, Task, Worker
-
-CONNECT = 10.0
-"""Seconds to wait for the scheduler to answer."""
 
 AHEAD = 4
 """Meshes handed out for each thread of the cluster: enough that none waits, few enough to keep nothing piled up."""
@@ -35,19 +32,9 @@ def results_of_cluster(
     A Dask worker that dies has its meshes checked by another; one that does so again and again makes its mesh
     ``not-run``. Raises InputError where distributed is not installed or no scheduler answers.
     """
-    try:
-        from distributed import Client, as_completed
-    except ImportError as error:
-        raise InputError(
-            "--scheduler", f"needs the package {error.name}", "install it: pip install 'sss-tools[cluster]'"
-        ) from error
-    try:
-        client = Client(address, timeout=CONNECT, set_as_default=False)
-    except (OSError, ValueError, TypeError) as error:
-        raise InputError(
-            f"--scheduler {address}", "no Dask scheduler answers there", "use for example tcp://HOST:8786"
-        ) from error
-    with client:
+    with connected(address) as client:
+        from distributed import as_completed
+
         folder = str(Path.cwd())
         numbers = {}
 

@@ -353,9 +353,8 @@ def test_a_bad_configuration_is_one_line_and_status_two(in_folder, capsys, text)
 
 
 def test_a_scheduler_that_is_not_there_is_one_line_and_status_two(in_folder, capsys, monkeypatch):
-    cluster = pytest.importorskip("sss_tools.cluster")
     pytest.importorskip("distributed")
-    monkeypatch.setattr(cluster, "CONNECT", 0.5)
+    monkeypatch.setattr("sss_tools.scheduler.CONNECT", 0.5)
     assert main([write("box.ply", shapes.box()), "--scheduler", "tcp://127.0.0.1:9"]) == 2
     captured = capsys.readouterr()
     assert captured.err.startswith("sss-check: error: --scheduler tcp://127.0.0.1:9: ")
