@@ -244,7 +244,7 @@ def many_page(many: dict, on: dict) -> str:
         f"{by * fresh / 3.6e6:.1f} h at {fresh:.0f} ms a mesh of this kind",
         f"{by * resumed['bytes'] / count / 1e6:.0f} MB of lines",
         f"{by * many['cache'] / max(count - count // 50, 1) / 1e6:.0f} MB of cache",
-        f"{by * cached / 3.6e6:.1f} h where all are known ({cached:.0f} ms each)",
+        *([f"{by * cached / 3.6e6:.1f} h where all are known ({cached:.0f} ms each)"] if cached > 0.5 else []),
     ]
     lines = [
         "",

@@ -26,8 +26,8 @@ STDOUT = (None, "-", "/dev/stdout")
 def lines_as_they_come(options: argparse.Namespace) -> Iterator[Callable[[MeshReport], None]]:
     """A function that writes the line of a mesh at once, where lines were asked for.
 
-    A file is not written beside and renamed, but grows: that is what lines are for. Of a command that is killed every line
-    but the last is whole. Raises InputError where the file cannot be written.
+    A file is not written beside and renamed, but grows: that is what lines are for. Of a command that is killed every
+    line but the last is whole. Raises InputError where the file cannot be written.
     """
     if options.format != "jsonl":
         yield lambda report: None
@@ -53,7 +53,7 @@ def lines_as_they_come(options: argparse.Namespace) -> Iterator[Callable[[MeshRe
         stream: TextIO = sys.stdout
         yield write
         return
-    stream = tried(lambda: Path(options.output).open("w", encoding="utf-8"))
+    stream = tried(lambda: open(options.output, "w", encoding="utf-8"))  # noqa: SIM115, PTH123 - closed below
     try:
         yield write
     finally:

@@ -18,9 +18,9 @@ from numpy.typing import NDArray
 
 from ..output.film import Film
 from ..render import Renderer, Settings
-from ..stages import Stages
 from ..scene.description import Camera, Scene
 from ..shaders.selection import Measured
+from ..stages import Stages
 from .queue import ClusterLost, TaskQueue, Traffic, where
 from .task import Parcel, Pass, Result, Task, digest, unpacked
 from .worker import machine

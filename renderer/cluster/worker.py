@@ -16,8 +16,8 @@ import numpy as np
 from ..output import passes as pass_numbers
 from ..output.film import Film
 from ..render import Renderer
-from ..stages import Stages
 from ..scene.description import Camera
+from ..stages import Stages
 from ..tracing.tally import Tally
 from .task import Parcel, Pass, Result, Task, digest, unpacked
 

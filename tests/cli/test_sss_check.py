@@ -322,7 +322,7 @@ def test_lines_have_no_place_for_statistics_and_no_room_on_a_full_disk(in_folder
     write("a.ply", shapes.box())
     assert main(["a.ply", "--format", "jsonl", "--statistics"]) == 2
     assert "--statistics" in capsys.readouterr().err
-    if os.path.exists("/dev/full"):
+    if Path("/dev/full").exists():
         assert main(["a.ply", "--format", "jsonl", "-o", "/dev/full"]) == 2
         said = capsys.readouterr().err
         assert said.startswith("sss-check: error: /dev/full: cannot be written") and said.count("\n") == 1
