@@ -243,7 +243,7 @@ def many_page(many: dict, on: dict) -> str:
         f"at most {most / 1e6:.0f} MB in the command ({TASK_BYTES} bytes a path, and the slope's upper end)",
         f"{by * fresh / 3.6e6:.1f} h at {fresh:.0f} ms a mesh of this kind",
         f"{by * resumed['bytes'] / count / 1e6:.0f} MB of lines",
-        f"{by * many['cache'] / max(count - count // 50, 1) / 1e6:.0f} MB of cache",
+        f"{by * many['cache'] / max(count - count // 50, 1) / 1e6:.0f} MB of cache, which keeps the latest 268 MB",
         *([f"{by * cached / 3.6e6:.1f} h where all are known ({cached:.0f} ms each)"] if cached > 0.5 else []),
     ]
     lines = [

@@ -239,7 +239,9 @@ def judge(samples: list[Sample]) -> dict[str, Verdict]:
     verdicts = {}
     for name in (*MEMORY, *COUNTS):
         values = np.array([getattr(one, name) for one in samples], float)[measured]
-        slope, _, low, high = theilslopes(values, hour, 0.95)
+        slope = low = high = 0.0
+        if np.ptp(values):
+            slope, _, low, high = theilslopes(values, hour, 0.95)
         most = float(values[early].max()), float(values[late].max())
         growth = high * (hour[-1] - hour[0])
         flat = growth < TOLERANCE * np.median(values) if name in MEMORY else most[1] <= most[0]

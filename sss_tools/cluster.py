@@ -13,10 +13,15 @@ import threading
 from collections.abc import Generator, Iterator, Sequence
 from itertools import islice
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from .scheduler import connected
+from .errors import InputError
+from .scheduler import connected, is_gone
 from .validation.outcome import MeshReport
 from .worker import Check, Task, Worker
+
+if TYPE_CHECKING:
+    from distributed import Client
 
 AHEAD = 4
 """Meshes handed out for each thread of the cluster: enough that none waits, few enough to keep nothing piled up."""
@@ -30,7 +35,7 @@ def results_of_cluster(
     """The reports and the number of their task, as they come in from the cluster at ``address``.
 
     A Dask worker that dies has its meshes checked by another; one that does so again and again makes its mesh
-    ``not-run``. Raises InputError where distributed is not installed or no scheduler answers.
+    ``not-run``. Raises InputError where distributed is not installed, no scheduler answers, or it is lost.
     """
     with connected(address) as client:
         from distributed import as_completed
@@ -46,21 +51,42 @@ def results_of_cluster(
         waiting = enumerate(tasks)
         ahead = AHEAD * max(sum(client.nthreads().values()), 1)
         completed = as_completed([submit(entry) for entry in islice(waiting, ahead)], loop=client.loop)
-        for future in completed:
-            number = numbers.pop(future.key)
-            yield number, _report(future, tasks[number])
-            for entry in islice(waiting, 1):
-                completed.add(submit(entry))
+        while not completed.is_empty():
+            with _or_lost(client, address):
+                future = next(completed)
+                number = numbers.pop(future.key)
+                report = _report(future, tasks[number])
+            yield number, report
+            with _or_lost(client, address):
+                for entry in islice(waiting, 1):
+                    completed.add(submit(entry))
+
+
+@contextlib.contextmanager
+def _or_lost(client: Client, address: str) -> Iterator[None]:
+    """Turn what a lost scheduler makes the client raise into one line."""
+    try:
+        yield
+    except (KeyboardInterrupt, SystemExit, MemoryError):
+        raise
+    except BaseException as error:  # asyncio's cancellation is no Exception
+        if not is_gone(error, client):
+            raise
+        raise InputError(
+            f"--scheduler {address}", "the scheduler is gone", "start it again; what was checked is in the cache"
+        ) from None
 
 
 def _report(future, task: Task) -> MeshReport:
     """What came of a task."""
+    if future.cancelled():
+        raise ConnectionError("the scheduler no longer knows of it")
     error = future.exception()
     if error is None:
         return future.result()
     from .validation.run import report_not_checked
 
-    # KilledWorker, a lost scheduler, an environment without this package: the mesh was not looked at
+    # KilledWorker, an environment without this package: the mesh was not looked at
     reason = f"the cluster could not check it ({type(error).__name__}: {error})"
     return report_not_checked(task.path, reason, task.settings)
 

@@ -47,6 +47,15 @@ def connected(address: str) -> Iterator[Client]:
         yield client
 
 
+def is_gone(error: BaseException, client: Client) -> bool:
+    """Whether an error of a client means that its scheduler can no longer be asked."""
+    import asyncio
+    import concurrent.futures
+
+    gone = asyncio.CancelledError, concurrent.futures.CancelledError, OSError
+    return isinstance(error, gone) or client.status != "running"
+
+
 def _version_warning() -> type[Warning]:
     from distributed.versions import VersionMismatchWarning
 

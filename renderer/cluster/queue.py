@@ -12,6 +12,7 @@ from queue import Empty, SimpleQueue
 from typing import TYPE_CHECKING, Any
 
 from sss_tools.errors import InputError
+from sss_tools.scheduler import is_gone
 
 from .task import Result, Task
 from .worker import render
@@ -146,11 +147,7 @@ class TaskQueue:
 
     def _problem(self, error: BaseException) -> tuple[str, str]:
         """What is wrong, and what to do."""
-        import asyncio
-        import concurrent.futures
-
-        gone = asyncio.CancelledError, concurrent.futures.CancelledError, OSError
-        if isinstance(error, gone) or self._client.status != "running":
+        if is_gone(error, self._client):
             resumable = self._resumable or self._traffic.tasks > 0
             return "the scheduler is gone", f"start it again{', and use --resume' * resumable}"
         if type(error).__name__ == "KilledWorker":

@@ -18,6 +18,7 @@ from ..output.film import Film
 from ..render import Renderer
 from ..scene.description import Camera
 from ..stages import Stages
+from ..tracing.memory import give_back_memory
 from ..tracing.tally import Tally
 from .task import Parcel, Pass, Result, Task, digest, unpacked
 
@@ -82,10 +83,11 @@ def _renderer(parcel: bytes) -> Renderer:
     key = digest(parcel)
     with _building:
         if key not in _built:
+            if len(_built) == KEPT_SCENES:
+                _built.popitem(last=False)
+                give_back_memory()
             sent: Parcel = pickle.loads(parcel)
             _built[key] = Renderer(sent.scene, sent.settings, sent.passes, measured=sent.measured)
-            while len(_built) > KEPT_SCENES:
-                _built.popitem(last=False)
         _built.move_to_end(key)
         return _built[key]
 

@@ -104,8 +104,9 @@ def test_a_target_error_ends_at_the_same_pass_and_the_report_tells_of_the_cluste
     assert_same_bits(here, there)
     told = json.loads(Path("report.json").read_text())
     assert told["cluster"]["workers"] == 2 and told["cluster"]["tasks"] > 0 and told["rays"] > 0
-    # 13 bytes a pixel and pass: three floats, and two bits
-    assert 12 < told["cluster"]["received"] / 64 / 56 / there["passes"] < 13 * 2
+    render("more.npz", "--scheduler", cluster.address, "--report", "report.json", "--shader", "path", "--passes", 8)
+    # three floats and two bits a pixel and pass
+    assert json.loads(Path("report.json").read_text())["cluster"]["received"] == 64 * 56 * 8 * 12.25
 
 
 def test_time_is_kept(workplace, cluster):
