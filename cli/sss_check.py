@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from sss_tools.errors import InputError
 from sss_tools.validation.outcome import MeshReport
 
-from .check_report import FORMATS, refuse_to_overwrite, write_report
+from .check_report import FORMATS, lines_as_they_come, refuse_to_overwrite, write_report
 from .command import ArgumentParser, complain, progress, run
 
 PROGRAM = "sss-check"
@@ -44,10 +44,13 @@ def _check(argv: Sequence[str] | None) -> int:
     if not options.quiet:
         for path in maker.outside_scene:
             complain(PROGRAM, f"{path}: is not in {options.scene}; it is checked by itself", "warning")
-    with progress(len(tasks), "checking", options.quiet) as advance:
-        reports = check_tasks(
-            tasks, maker.jobs, done=lambda report: advance(1, report.path), scheduler=options.scheduler
-        )
+    with progress(len(tasks), "checking", options.quiet) as advance, lines_as_they_come(options) as write_line:
+
+        def done(report: MeshReport) -> None:
+            write_line(report)
+            advance(1, report.path)
+
+        reports = check_tasks(tasks, maker.jobs, done=done, scheduler=options.scheduler)
     status = 0
     for report in reports:
         _complain_of(report, options.quiet)
@@ -83,7 +86,8 @@ def _parser() -> ArgumentParser:
         "or - for a list on stdin")  # fmt: skip
     add("--material", metavar="NAME|FILE", help="what the meshes are made of: a preset, or a TOML file")
     add("--scene", metavar="SCENE.toml", help="give the meshes the materials, scale and neighbours they have there")
-    add("--format", choices=FORMATS, default="full", help="how to report (default: full)")
+    add("--format", choices=FORMATS, default="full", help="how to report (default: full); jsonl: a line a mesh, as "
+        "soon as it is checked")  # fmt: skip
     add("-o", "--output", metavar="FILE", help="write the report there instead of to stdout")
     add("--unit", choices=("mm", "cm", "m", "inch"), help="what one mesh unit is")
     add("--select", metavar="CODES", action="append", default=[], help="rules to run: codes, prefixes, names: a,b")

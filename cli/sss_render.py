@@ -16,9 +16,11 @@ from sss_tools.errors import InputError
 from sss_tools.memory import limited_memory, share_of_memory
 
 from .clock import process_start
-from .command import ArgumentParser, complain, progress, run, unavailable, version
+from .command import ArgumentParser, complain, progress, run, version
 
 if TYPE_CHECKING:
+    from distributed import Client
+
     from renderer.job import Budget
     from renderer.render import Renderer, Settings
     from renderer.scene.description import Scene, SceneObject
@@ -75,22 +77,32 @@ def _render(argv: Sequence[str] | None) -> int:
 
 def _picture(options: Any, started: float) -> int:
     """Render and write."""
-    from renderer.job import execute, guide_arrays, rare_event_warnings, report
     from renderer.output.image import check_writable
-    from renderer.render import Renderer
-    from renderer.stages import Stages
 
     check_writable(options.output)
     if options.preview is not None:
         check_writable(options.preview)
     if options.report is not None:
         _check_report(options.report)
+    if options.scheduler is None:
+        return _rendered(options, started)
+    from sss_tools.scheduler import connected
+
+    with connected(options.scheduler) as client:
+        return _rendered(options, started, client)
+
+
+def _rendered(options: Any, started: float, client: Client | None = None) -> int:
+    """Render, here or on a cluster, and write."""
+    from renderer.job import execute, guide_arrays, rare_event_warnings, report
+    from renderer.stages import Stages
+
     stages = Stages()
     with stages.stage("load"):
         scene = _scene(options)
     settings, passes = _settings(options), _passes(options)
     scene, measured = _piloted(options, scene, settings, stages)
-    renderer = Renderer(scene, settings, passes, stages, measured)
+    renderer = _renderer(client, scene, settings, passes, stages, measured)
     budget = _budget(options, started, renderer.plans)
     if not options.quiet:
         _explain(renderer)
@@ -117,6 +129,17 @@ def _picture(options: Any, started: float) -> int:
     if not options.quiet:
         print(f"{options.output}: {picture.film.passes} passes in {total:.1f} s")
     return 0
+
+
+def _renderer(client: Client | None, *arguments: Any) -> Renderer:
+    """One that renders by threads of this process, or by a cluster."""
+    if client is None:
+        from renderer.render import Renderer
+
+        return Renderer(*arguments)
+    from renderer.cluster.renderer import ClusterRenderer
+
+    return ClusterRenderer(client, *arguments)
 
 
 def _parser() -> ArgumentParser:
@@ -150,7 +173,8 @@ def _parser() -> ArgumentParser:
                         help="picture to watch, kept up to date: .png, .exr or .npz")  # fmt: skip
     parser.add_argument("--seed", type=_whole, default=0, metavar="K", help="of the random numbers (default: 0)")
     parser.add_argument("--threads", type=_positive_int, metavar="N", help="default: one a core")
-    parser.add_argument("--scheduler", metavar="ADDRESS", help="of a cluster")
+    parser.add_argument("--scheduler", metavar="ADDRESS",
+                        help="render on the Dask cluster with this scheduler")  # fmt: skip
     parser.add_argument("--max-memory", type=_memory, metavar="SIZE",
                         help="bytes to use at most: 500M, 2G (default: nine tenths of the machine's)")  # fmt: skip
     parser.add_argument("--size", type=_size, metavar="WxH", help="of the picture (default: the scene's, or 500x500)")
@@ -170,9 +194,10 @@ def _parser() -> ArgumentParser:
 
 
 def _refuse(options: Any) -> None:
-    """Say no to what this version does not do yet, and to options that would be ignored."""
-    if options.scheduler is not None:
-        raise unavailable("--scheduler")
+    """Say no to options that would be ignored."""
+    if options.scheduler is not None and options.threads is not None:
+        raise InputError("--threads", "is for rendering here; those of a cluster belong to its workers",
+                         "leave it out, and start dask worker with --nthreads")  # fmt: skip
     if options.adaptive and options.pass_range is not None:
         raise InputError("--adaptive", "decides later passes by earlier ones, so it has no part of a render to itself",
                          "leave out --pass-range, or --adaptive")  # fmt: skip

@@ -17,6 +17,8 @@ from numpy.typing import NDArray
 from sss_tools.errors import InputError
 
 from . import adaptive
+from .cluster.queue import ClusterLost
+from .cluster.renderer import ClusterRenderer
 from .output import image, passes
 from .output.film import Film
 from .output.image import Picture
@@ -89,8 +91,8 @@ def execute(
     progress  is told what is done, of how much, and in which words
 
     A checkpoint beside the output keeps what is done of a render that dies; ``resume`` goes on from it, or from the
-    output itself where that is an npz. On KeyboardInterrupt the whole passes so far are written, and the exception
-    goes on. Raises InputError where the output cannot be written or there is nothing that fits to resume.
+    output itself where that is an npz. On KeyboardInterrupt and ClusterLost the whole passes so far are written, and
+    the exception goes on. Raises InputError where the output cannot be written or there is nothing that fits to resume.
     """
     image.check_writable(output)
     checkpoint = checkpoint_path(output)
@@ -141,7 +143,7 @@ def execute(
             error = renderer.film.mean_relative_stderr()
         if not (resume and renderer.film.passes and finished()):
             _run(renderer, budget, after_pass, seconds_left if budget.seconds else None)
-    except KeyboardInterrupt:
+    except (KeyboardInterrupt, ClusterLost):
         if renderer.film.passes:
             write()
             if output.suffix != ".npz":
@@ -324,6 +326,7 @@ def report(
         },
         "light_methods": light_methods(renderer),
         "peak_memory": peak_memory(),
+        **({"cluster": asdict(renderer.traffic)} if isinstance(renderer, ClusterRenderer) else {}),
     }
 
 

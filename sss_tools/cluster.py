@@ -13,13 +13,15 @@ import threading
 from collections.abc import Generator, Iterator, Sequence
 from itertools import islice
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from .errors import InputError
+from .scheduler import connected, is_gone
 from .validation.outcome import MeshReport
 from .worker import Check, Task, Worker
 
-CONNECT = 10.0
-"""Seconds to wait for the scheduler to answer."""
+if TYPE_CHECKING:
+    from distributed import Client
 
 AHEAD = 4
 """Meshes handed out for each thread of the cluster: enough that none waits, few enough to keep nothing piled up."""
@@ -33,21 +35,11 @@ def results_of_cluster(
     """The reports and the number of their task, as they come in from the cluster at ``address``.
 
     A Dask worker that dies has its meshes checked by another; one that does so again and again makes its mesh
-    ``not-run``. Raises InputError where distributed is not installed or no scheduler answers.
+    ``not-run``. Raises InputError where distributed is not installed, no scheduler answers, or it is lost.
     """
-    try:
-        from distributed import Client, as_completed
-    except ImportError as error:
-        raise InputError(
-            "--scheduler", f"needs the package {error.name}", "install it: pip install 'sss-tools[cluster]'"
-        ) from error
-    try:
-        client = Client(address, timeout=CONNECT, set_as_default=False)
-    except (OSError, ValueError, TypeError) as error:
-        raise InputError(
-            f"--scheduler {address}", "no Dask scheduler answers there", "use for example tcp://HOST:8786"
-        ) from error
-    with client:
+    with connected(address) as client:
+        from distributed import as_completed
+
         folder = str(Path.cwd())
         numbers = {}
 
@@ -59,21 +51,42 @@ def results_of_cluster(
         waiting = enumerate(tasks)
         ahead = AHEAD * max(sum(client.nthreads().values()), 1)
         completed = as_completed([submit(entry) for entry in islice(waiting, ahead)], loop=client.loop)
-        for future in completed:
-            number = numbers.pop(future.key)
-            yield number, _report(future, tasks[number])
-            for entry in islice(waiting, 1):
-                completed.add(submit(entry))
+        while not completed.is_empty():
+            with _or_lost(client, address):
+                future = next(completed)
+                number = numbers.pop(future.key)
+                report = _report(future, tasks[number])
+            yield number, report
+            with _or_lost(client, address):
+                for entry in islice(waiting, 1):
+                    completed.add(submit(entry))
+
+
+@contextlib.contextmanager
+def _or_lost(client: Client, address: str) -> Iterator[None]:
+    """Turn what a lost scheduler makes the client raise into one line."""
+    try:
+        yield
+    except (KeyboardInterrupt, SystemExit, MemoryError):
+        raise
+    except BaseException as error:  # asyncio's cancellation is no Exception
+        if not is_gone(error, client):
+            raise
+        raise InputError(
+            f"--scheduler {address}", "the scheduler is gone", "start it again; what was checked is in the cache"
+        ) from None
 
 
 def _report(future, task: Task) -> MeshReport:
     """What came of a task."""
+    if future.cancelled():
+        raise ConnectionError("the scheduler no longer knows of it")
     error = future.exception()
     if error is None:
         return future.result()
     from .validation.run import report_not_checked
 
-    # KilledWorker, a lost scheduler, an environment without this package: the mesh was not looked at
+    # KilledWorker, an environment without this package: the mesh was not looked at
     reason = f"the cluster could not check it ({type(error).__name__}: {error})"
     return report_not_checked(task.path, reason, task.settings)
 

@@ -43,6 +43,11 @@ def mesh_object(report: MeshReport) -> dict[str, Any]:
     return data
 
 
+def line(report: MeshReport) -> str:
+    """``mesh_object`` as one line, with the end of the line."""
+    return json.dumps(mesh_object(report), allow_nan=False) + "\n"
+
+
 def rule_object(rule: RuleReport) -> dict[str, Any]:
     """One entry of ``rules``; what only the program itself needs is left out."""
     data = asdict(rule)

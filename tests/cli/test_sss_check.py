@@ -304,6 +304,49 @@ def test_sarif_and_github_reports_are_written(in_folder, capsys):
     assert text.startswith("::error file=box.ply,title=SSS204 inverted-shell::") and "       1        1" in text
 
 
+def test_lines_of_json_come_as_meshes_are_checked(in_folder, capsys):
+    write("a.ply", shapes.box())
+    write("b.ply", shapes.inverted(shapes.box()))
+    (in_folder / "c.ply").write_text("ply")
+    assert main([".", "--format", "jsonl", "-o", "lines.jsonl", "--jobs", "1"]) == 2
+    assert capsys.readouterr().out == ""
+    assert main([".", "--format", "json", "-o", "whole.json"]) == 2
+    lines = {one["path"]: one for one in map(json.loads, (in_folder / "lines.jsonl").read_text().splitlines())}
+    whole = {one["path"]: one for one in json.loads((in_folder / "whole.json").read_text())["meshes"]}
+    assert lines.keys() == whole.keys()
+    for path, one in lines.items():
+        assert one["rules"] == whole[path]["rules"] and one["closedness"] == whole[path]["closedness"]
+
+
+def test_lines_have_no_place_for_statistics_and_no_room_on_a_full_disk(in_folder, capsys):
+    write("a.ply", shapes.box())
+    assert main(["a.ply", "--format", "jsonl", "--statistics"]) == 2
+    assert "--statistics" in capsys.readouterr().err
+    if Path("/dev/full").exists():
+        assert main(["a.ply", "--format", "jsonl", "-o", "/dev/full"]) == 2
+        said = capsys.readouterr().err
+        assert said.startswith("sss-check: error: /dev/full: cannot be written") and said.count("\n") == 1
+
+
+def test_a_run_that_is_killed_leaves_whole_lines_and_the_next_one_goes_on(in_folder, capsys):
+    for number in range(12):
+        write(f"{number}.ply", shapes.icosphere(1.0 + number, 2))
+    running = subprocess.Popen(
+        [sys.executable, "-m", "cli.sss_check", ".", "--format", "jsonl", "-o", "lines.jsonl", "-q", "--jobs", "1"],
+        env={**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])},
+    )
+    lines = in_folder / "lines.jsonl"
+    while not lines.exists() or lines.read_bytes().count(b"\n") < 3:
+        assert running.poll() is None
+        time.sleep(0.005)
+    running.kill()
+    running.wait()
+    done = [json.loads(line)["path"] for line in lines.read_text().splitlines(keepends=True) if line.endswith("\n")]
+    assert main([".", "--format", "jsonl", "-o", "lines.jsonl", "-q"]) == 0
+    again = {one["path"]: one["cached"] for one in map(json.loads, lines.read_text().splitlines())}
+    assert len(again) == 12 and all(again[path] for path in done)
+
+
 def test_statistics_are_part_of_a_report_for_programs(in_folder, capsys):
     path = write("box.ply", shapes.inverted(shapes.box()))
     _, data = run_json(capsys, path, "--statistics")
@@ -353,9 +396,8 @@ def test_a_bad_configuration_is_one_line_and_status_two(in_folder, capsys, text)
 
 
 def test_a_scheduler_that_is_not_there_is_one_line_and_status_two(in_folder, capsys, monkeypatch):
-    cluster = pytest.importorskip("sss_tools.cluster")
     pytest.importorskip("distributed")
-    monkeypatch.setattr(cluster, "CONNECT", 0.5)
+    monkeypatch.setattr("sss_tools.scheduler.CONNECT", 0.5)
     assert main([write("box.ply", shapes.box()), "--scheduler", "tcp://127.0.0.1:9"]) == 2
     captured = capsys.readouterr()
     assert captured.err.startswith("sss-check: error: --scheduler tcp://127.0.0.1:9: ")

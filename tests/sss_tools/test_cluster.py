@@ -8,8 +8,10 @@ import time
 
 import pytest
 
+from benchmarks.local_cluster import LocalCluster
 from sss_tools import shapes
 from sss_tools.batch import Task, check_tasks
+from sss_tools.errors import InputError
 from sss_tools.validation.outcome import Outcome
 from sss_tools.validation.settings import Settings
 from sss_tools.writing import write_mesh
@@ -83,6 +85,13 @@ def test_a_worker_killed_in_the_middle_costs_no_report(tmp_path, monkeypatch, cl
     # relative paths mean what they mean here
     assert [report.path for report in reports] == [task.path for task in tasks]
     assert all(report.status == "ok" and report.exit_status == 1 for report in reports)
+
+
+def test_a_scheduler_that_is_killed_is_one_line(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    tasks = tasks_for(tmp_path, *(f"{number}.ply" for number in range(40)))
+    with LocalCluster(tmp_path, 1) as mortal, pytest.raises(InputError, match="the scheduler is gone"):
+        check_tasks(tasks, scheduler=mortal.address, done=lambda report: mortal.scheduler.kill())
 
 
 def test_a_crash_and_a_hang_are_one_meshs_not_run_there_too(tmp_path, monkeypatch, cluster, slow_check):
