@@ -36,7 +36,10 @@ from sss_tools.elephant import elephant
 from sss_tools.loading import load_mesh
 from sss_tools.medium import Medium
 from sss_tools.mesh import Mesh
+from sss_tools.rays import RayCaster, UnitFrame
 from sss_tools.repair.ladder import repair_mesh
+from sss_tools.sealing import seal
+from sss_tools.winding import winding_numbers
 
 PIXELS = 12
 BATCHES = 8
@@ -71,12 +74,27 @@ def main() -> None:
     parser.add_argument("--only", help='one solid, or "bunny": the rest of holes.json stays as it is')
     parser.add_argument("--meshes", type=Path, default=Path("../shared/meshes"))
     parser.add_argument("-o", "--output", type=Path, default=Path("docs"))
+    parser.add_argument(
+        "--angles", action="store_true", help="only measure the angles of the cases in holes.json again"
+    )
     options = parser.parse_args()
     options.output.mkdir(parents=True, exist_ok=True)
     kept = options.output / "holes.json"
     figures: dict[str, Any] = {"machine": machine(2), "cases": [], "bunny": []}
     if options.only and kept.exists():
         figures |= json.loads(kept.read_text())
+    if options.angles:
+        figures |= json.loads(kept.read_text())
+        for name, mesh in solids(options.meshes).items():
+            mine = [row for row in figures["cases"] if row["solid"] == name]
+            for row, (share, shape, places) in zip(mine, CUTS, strict=True):
+                row["whole_angle"] = whole_angle(mesh, cut_open(mesh, share, shape, places))
+                print(
+                    f"{name} {share} {shape} {'+'.join(places)}: {row['half_angle']} {row['whole_angle']}", flush=True
+                )
+        kept.write_text(json.dumps(figures, indent=1) + "\n")
+        (options.output / "holes.md").write_text(markdown(figures))
+        return
     bunny = options.meshes / "bunny_stanford.obj"
     if options.only in (None, "bunny") and bunny.exists():
         figures["bunny"] = bunny_measured(bunny, options.bunny_passes)
@@ -137,6 +155,39 @@ def cut_open(mesh: Mesh, share: float, shape: str, places) -> Mesh:
         if kept.all():
             return Mesh(topology.points, topology.faces)
         faces = faces[kept]
+
+
+def whole_angle(whole: Mesh, opened: Mesh) -> float | None:
+    """Degrees that the widest loop of ``opened`` subtends from inside ``whole``; None where none has a cap.
+
+    Of the cone with the solid angle that its cap takes of the sphere around the middle of the stretch inside ``whole``
+    along the cap's normal. ``HoleReport.half_angle`` cannot know ``whole``: where a limb is cut off, it is the angle
+    from inside the stump.
+    """
+    sealed = seal(opened)
+    caps = sealed.mesh.faces[sealed.faces :]
+    if len(caps) == 0:
+        return None
+    component = Mesh(sealed.mesh.vertices, caps).topology.component_of_face
+    frame = UnitFrame.around(*whole.bounds)
+    caster = RayCaster(frame.points_in(whole.vertices), whole.faces)
+    widest = 0.0
+    for k in range(component.max() + 1):
+        faces = caps[component == k]
+        cap = Mesh(sealed.mesh.vertices, faces)
+        outward = cap.face_vectors.sum(axis=0)
+        outward /= max(float(np.linalg.norm(outward)), 1e-300)
+        middle = cap.face_areas @ cap.vertices[faces].mean(axis=1) / cap.area
+        # a cap may lie outside: it starts from just below
+        start = frame.points_in(middle - 1e-3 * whole.longest_side * outward)
+        ends = []
+        for way in (outward, -outward):
+            distance, _ = caster.closest(start.astype(np.float32).reshape(3, 1), way.astype(np.float32).reshape(3, 1))
+            ends.append(start + float(distance[0]) * way)
+        place = frame.points_out((ends[0] + ends[1]) / 2)
+        share = abs(float(winding_numbers(place, cap.vertices, faces)[0]))
+        widest = max(widest, float(np.degrees(np.arccos(np.clip(1 - 2 * share, -1, 1)))))
+    return widest
 
 
 # ---- rendering ----
@@ -207,6 +258,7 @@ def solid_measured(name: str, mesh: Mesh, passes: int) -> list[dict]:
             "share": 1 - opened.area / mesh.area,
             "shape": shape,
             "places": list(places),
+            "whole_angle": whole_angle(mesh, opened),
         }
         for handling in ("auto", "terminate"):
             shown, _, renderer = pictures(opened, material, cameras, lights, handling, passes)
