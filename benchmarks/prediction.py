@@ -24,7 +24,7 @@ from benchmarks.calibrate_prediction import anchors, fitted
 from benchmarks.prediction_cases import Case, measured_cases
 from renderer.enough import FIRST, next_round
 from renderer.shaders.prediction import SURE, Error, Fit, fits, parsed, predicted_errors, predicted_noise
-from renderer.shaders.selection import CHEAPEST_FIRST, Demand, passes_within, shares_of
+from renderer.shaders.selection import CHEAPEST_FIRST, Demand, noise_allowed, passes_within, shares_of
 
 QUALITIES = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.8)
 
@@ -126,9 +126,10 @@ def _chosen(case: Case, by: dict[str, Fit], quality: float) -> Judged:
     errors, noise = predicted_errors(case.look, by), predicted_noise(case.look, by)
     shares = shares_of({name: error.bound for name, error in errors.items()}, demand, size)
     shader = max(shares, key=shares.__getitem__)
-    passes, seen = _passes_of_path(case, noise, allowed)
+    quiet = noise_allowed(allowed, [error.error for error in errors.values()])
+    passes, seen = _passes_of_path(case, noise, quiet)
     measured = dict(case.measured.errors) | {"path": _scaled(case.measured.noise, passes)}
-    planned = errors | {"path": _scaled(noise, passes_within(noise.bound, allowed))}
+    planned = errors | {"path": _scaled(noise, passes_within(noise.bound, quiet))}
     told = errors | {"path": _scaled(seen, passes)}
     found, before, after = (sum(share * of[name].error for name, share in shares.items())
                             for of in (measured, planned, told))  # fmt: skip

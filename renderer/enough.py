@@ -70,7 +70,9 @@ def _needed(film: Film, where: NDArray[np.bool_], plan: Plan) -> int:
     if is_by_path(plan) and not where.any():
         return 1  # behind others, or out of the picture
     noise = noise_seen(film, where) if is_by_path(plan) else None
-    return plan.passes if noise is None or plan.tolerance is None else passes_within(noise.bound, plan.tolerance)
+    return (
+        plan.passes if noise is None or plan.noise_allowed is None else passes_within(noise.bound, plan.noise_allowed)
+    )
 
 
 def noise_seen(film: Film, where: NDArray[np.bool_]) -> Error | None:

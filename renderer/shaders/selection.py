@@ -68,6 +68,7 @@ class Plan:
     tolerance           relative error allowed; None for opaque objects
     shares              of its camera samples that each shader lights: one, or several near a threshold
     passes              that its chosen shaders need, or those given
+    noise_allowed       to path where it lights the object: within the tolerance, and less than others are wrong by
     candidates          cheapest first; none for opaque objects and those without an inside
     """
 
@@ -84,6 +85,7 @@ class Plan:
     tolerance: float | None = None
     shares: dict[str, float] = field(default_factory=dict)
     passes: int = 1
+    noise_allowed: float | None = None
     candidates: tuple[Candidate, ...] = ()
 
 
@@ -137,6 +139,13 @@ def tolerance(quality: float, size_px: float) -> float:
 def passes_within(noise: float, allowed: float) -> int:
     """Camera samples a pixel after which their mean is noisy by ``allowed``, see ``MOST_PASSES``."""
     return math.ceil(1 / math.hypot((allowed / max(noise, 1e-6)) ** 2, 1 / MOST_PASSES) - 1e-9)
+
+
+def noise_allowed(allowed: float, others: Sequence[float]) -> float:
+    """The noise that path may have within ``allowed``, where it is chosen over shaders with the errors ``others``: a
+    dearer picture that is noisier than the cheaper one would be wrong is of use to nobody. As many passes as both need
+    together, so that more quality is always more of them."""
+    return 1 / math.hypot(1 / allowed, 1 / min(others, default=math.inf))
 
 
 def picture_passes(plans: Sequence[Plan]) -> int:
@@ -199,7 +208,7 @@ class _Chooser:
         handling, because = _handling(thing, self.hole_handling)
         wanted = thing.shader if self.shader == "auto" else self.shader
         warning, error, passes = None, None, fast_passes
-        candidates = () if handling == "surface" else self._candidates(thing, look, allowed)
+        candidates = () if handling == "surface" else self._candidates(thing, look, allowed, wanted == "auto")
         if handling == "surface":
             shares, reason = {"diffuse": 1.0}, "the mesh encloses no volume, so there is no inside for light"
             if wanted != "auto":
@@ -212,6 +221,7 @@ class _Chooser:
             bounds = {one.shader: one.error_bound for one in candidates}
             shares = shares_of(bounds, self.demand, look.size_px, _fades(thing))
             reason = self._reason(shares, candidates, allowed, look.size_px)
+        quiet = noise_allowed(allowed, [one.predicted_error for one in candidates[:-1]] if wanted == "auto" else [])
         if candidates:
             chosen = [(shares[one.shader], one) for one in candidates if one.shader in shares]
             error = sum(share * one.predicted_error for share, one in chosen)
@@ -230,16 +240,19 @@ class _Chooser:
             tolerance=allowed,
             shares=shares,
             passes=passes,
+            noise_allowed=quiet,
             candidates=candidates,
         )
 
-    def _candidates(self, thing: SceneObject, look: Appearance, allowed: float) -> tuple[Candidate, ...]:
+    def _candidates(self, thing: SceneObject, look: Appearance, allowed: float, free: bool) -> tuple[Candidate, ...]:
         found = self.measured.get(thing.name)
         errors = found.errors if found else predicted_errors(look)
         noise = found.noise if found else predicted_noise(look)
+        quiet = noise_allowed(allowed, [error.error for error in errors.values()] if free else [])
         candidates = []
         for name in CHEAPEST_FIRST:
-            passes = self.passes or passes_within(noise.bound if name == "path" else FAST_NOISE, allowed)
+            needed = passes_within(noise.bound, quiet) if name == "path" else passes_within(FAST_NOISE, allowed)
+            passes = self.passes or needed
             error = errors.get(name) or Error(noise.error * passes**-0.5, noise.bound * passes**-0.5)
             seconds = predicted_seconds(name, thing, look, passes, self.threads)
             candidates.append(Candidate(name, error.error, error.bound, passes, seconds, found is not None))

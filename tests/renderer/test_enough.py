@@ -70,8 +70,8 @@ def test_the_most_demanding_object_decides_and_fast_shaders_keep_their_plan():
     film, everywhere = noisy_film(0.7, side=20), np.zeros((20, 20), int)
     told = passes_needed(film, everywhere, [plan])
     assert told == passes_within(noise_seen(film, everywhere == 0).bound, plan.tolerance)
-    assert passes_needed(film, everywhere, [plan, replace(plan, tolerance=plan.tolerance / 100)]) == told
-    demanding = replace(plan, tolerance=plan.tolerance / 2)
+    assert passes_needed(film, everywhere, [plan, replace(plan, noise_allowed=plan.tolerance / 100)]) == told
+    demanding = replace(plan, noise_allowed=plan.tolerance / 2)
     assert passes_needed(film, everywhere, [demanding]) > 3 * told
     fast = replace(plan, shares={"plumb": 1.0}, passes=5 * told)
     assert passes_needed(film, everywhere, [fast]) == 5 * told

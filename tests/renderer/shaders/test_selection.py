@@ -138,6 +138,17 @@ def test_more_quality_is_never_fewer_passes_of_path_and_always_more_cost():
     assert all(b < a for a, b in pairwise(errors))
 
 
+def test_path_is_not_chosen_to_be_noisier_than_others_are_wrong():
+    """20 % are allowed, scalar may be more wrong than that but hardly is: noise of as much would be a worse picture."""
+    errors = {name: Error(0.05, 0.5) for name in CHEAPEST_FIRST[:-1]}
+    found = {"thing": Measured(errors, Error(1.0, 1.0))}
+    (plan,) = select(ball_at(3), target_error=0.2, measured=found)
+    assert plan.shader == "path" and plan.noise_allowed < 0.05
+    assert plan.predicted_error == pytest.approx(plan.noise_allowed, rel=0.02)
+    (asked,) = select(ball_at(3), shader="path", target_error=0.2, measured=found)
+    assert asked.noise_allowed == pytest.approx(0.2) and asked.passes < plan.passes / 10
+
+
 def test_the_picture_has_the_passes_of_its_most_demanding_object():
     near, far = placed(BALL, translucent(0.8, 2.0), name="near"), placed(
         shapes.moved(BALL, (0, 0, -400)), translucent(0.8, 2.0), name="far")  # fmt: skip
