@@ -186,7 +186,8 @@ def _scene(rng, mesh: Mesh) -> Scene:
     tau = np.exp(rng.uniform(np.log(0.1), np.log(100)))
     albedo = 1 - np.exp(rng.uniform(np.log(1e-3), np.log(0.6), 3))
     g = rng.uniform(-0.9, 0.95) if rng.uniform() < 0.5 else 0.0
-    medium = Medium.from_albedo(albedo, tau / mesh.mean_inradius, g, rng.choice([1.0, 1.3, 1.5, 1.8], p=[0.1, 0.3, 0.45, 0.15]))
+    ior = rng.choice([1.0, 1.3, 1.5, 1.8], p=[0.1, 0.3, 0.45, 0.15])
+    medium = Medium.from_albedo(albedo, tau / mesh.mean_inradius, g, ior)
     middle, size = mesh.bounds.mean(axis=0), mesh.diagonal
     view, shine = (_direction(rng) for _ in range(2))
     pixels = np.exp(rng.uniform(np.log(6), np.log(LARGEST)))
