@@ -17,6 +17,7 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.dolly import LIGHTS, body
+from renderer.enough import rounds
 from renderer.render import Renderer, Settings
 from renderer.scene.admission import admit
 from renderer.scene.description import EnvironmentLight, Scene
@@ -68,14 +69,14 @@ def sweep(name: str, options) -> list[dict]:
     points: list[dict] = []
     for quality in np.linspace(0, options.most, options.steps):
         renderer = Renderer(scene, Settings(quality=float(quality)))
-        passes = picture_passes(renderer.plans)
         start = time.process_time()
-        renderer.run(range(passes))
+        for passes, _ in rounds(renderer, picture_passes(renderer.plans)):
+            renderer.run(range(renderer.film.passes, passes))
         seconds = time.process_time() - start
         points.append({
             "quality": float(quality),
             "shares": renderer.plans[0].shares,
-            "passes": passes,
+            "passes": renderer.film.passes,
             "seconds": seconds,
             "error": error(renderer, reference),
             "tolerance": renderer.plans[0].tolerance,

@@ -297,7 +297,9 @@ def _budget(options: Any, started: float, plans: Sequence[Plan]) -> Budget:
         return Budget(first, last, started=started)
     if options.time is not None or options.target_error is not None:
         return Budget(0, None, options.time, options.target_error, options.adaptive, started)
-    return Budget(0, _passes(options) or picture_passes(plans), adaptive=options.adaptive, started=started)
+    passes = _passes(options)
+    by_noise = passes is None and not options.adaptive
+    return Budget(0, passes or picture_passes(plans), adaptive=options.adaptive, by_noise=by_noise, started=started)
 
 
 def _piloted(
@@ -335,7 +337,7 @@ def _explain_only(options: Any) -> int:
     if not options.quiet:
         for thing, plan, hole in zip(scene.objects, plans, holes, strict=True):
             _explain_at_length(thing, plan, hole, sources.get(plan.name, ""))
-        print(f"{passes} passes")
+        print(f"{passes} passes" + (", or as many as the first ones tell" if _passes(options) is None else ""))
     if options.report is not None:
         _write_report(options.report, json.dumps(plan_report(scene, plans, holes, passes, version(), stages), indent=1))
     return 0

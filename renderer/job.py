@@ -6,8 +6,8 @@ import sys
 import tempfile
 import time
 import warnings
-from collections.abc import Callable
-from dataclasses import asdict, dataclass
+from collections.abc import Callable, Iterator
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from sss_tools.errors import InputError
 
-from . import adaptive
+from . import adaptive, enough
 from .cluster.queue import ClusterLost
 from .cluster.renderer import ClusterRenderer
 from .output import image, passes
@@ -60,6 +60,8 @@ class Budget:
     target_error  mean relative standard error over object pixels
     adaptive      noisy pixels take part in more passes than others, see ``adaptive``
     started       when the command began, by ``time.monotonic``: clocks may be set while a render runs
+    by_noise      ``last`` is a guess: the first passes tell how many are enough, see ``enough``
+    expected      one past the last pass, as far as is known
     """
 
     first: int = 0
@@ -68,6 +70,8 @@ class Budget:
     target_error: float | None = None
     adaptive: bool = False
     started: float = 0.0
+    by_noise: bool = False
+    expected: int | None = None
 
     def left(self, done: passes.Ranges) -> range | list[int]:
         """The passes still to do."""
@@ -142,16 +146,29 @@ def execute(
         if resume:
             error = renderer.film.mean_relative_stderr()
         if not (resume and renderer.film.passes and finished()):
-            _run(renderer, budget, after_pass, seconds_left if budget.seconds else None)
+            for budget in _rounds(renderer, budget):  # noqa: B020  progress goes by the last
+                _run(renderer, budget, after_pass, seconds_left if budget.seconds else None)
     except (KeyboardInterrupt, ClusterLost):
         if renderer.film.passes:
             write()
             if output.suffix != ".npz":
                 image.write(checkpoint, renderer.picture(time.monotonic() - budget.started))
+            else:
+                checkpoint.unlink(missing_ok=True)
         raise
     picture = write()
     checkpoint.unlink(missing_ok=True)
     return picture
+
+
+def _rounds(renderer: Renderer, budget: Budget) -> Iterator[Budget]:
+    """The budget; where noise decides, with as many passes as what was seen so far asks for, round after round."""
+    if not budget.by_noise:
+        yield budget
+        return
+    assert budget.last is not None
+    for last, needed in enough.rounds(renderer, budget.last - budget.first):
+        yield replace(budget, last=budget.first + last, expected=budget.first + needed)
 
 
 def _run(
@@ -253,7 +270,7 @@ def _progress(renderer: Renderer, budget: Budget, now: float, error: float) -> t
         done = (budget.target_error / error) ** 2 if np.isfinite(error) and error > 0 else 0.0
         return min(done, 1.0), 1.0, text
     assert budget.last is not None
-    return film.passes, budget.last - budget.first, text
+    return film.passes, (budget.expected or budget.last) - budget.first, text
 
 
 def rare_event_warnings(renderer: Renderer) -> list[str]:

@@ -22,7 +22,7 @@ from .output.film import Film
 from .render import Renderer, Settings
 from .scene.description import Camera, Scene, SceneObject, ShaderChoice, Translucent
 from .shaders.appearance import appearance
-from .shaders.prediction import Error
+from .shaders.prediction import SURE, Error
 from .shaders.selection import CHEAPEST_FIRST, Measured
 
 SIDE, LEAST_SIDE = 64, 8
@@ -62,14 +62,14 @@ def measure(scene: Scene, settings: Settings, progress: Callable[[float], None] 
     return found
 
 
-def pilot(scene: Scene, index: int, settings: Settings, passes: int | None = None) -> Measured | None:
+def pilot(scene: Scene, index: int, settings: Settings, passes: float | None = None) -> Measured | None:
     """What small pictures of the object ``index`` tell, of so many passes of path in each half (None:
     ``PASSES``). None where no pixel shows it."""
     thing = scene.objects[index]
     side = int(np.clip(np.ceil(appearance(scene, thing).size_px * FRAME), LEAST_SIDE, SIDE))
     view = replace(scene, camera=_looking_at(scene.camera, thing, side), hash="")
     more = min((SIDE / side) ** 2, MOST_PASSES / PASSES)
-    exact = _halves(view, index, "path", settings, int((passes or PASSES) * more))
+    exact = _halves(view, index, "path", settings, max(int((passes or PASSES) * more), 2))
     where = exact.where
     if where.sum() < 2:
         return None
@@ -88,8 +88,8 @@ def _relative(products: NDArray[np.float64], mean: float) -> Error:
     squared = float(products.mean())
     # neighbouring channels share their paths, pixels do not
     doubt = float(products.mean(axis=1).std(ddof=1) / len(products) ** 0.5) if len(products) > 1 else abs(squared)
-    bias, bound = (max(squared + more * doubt, doubt) ** 0.5 / mean for more in (0, 1.645))
-    return Error(bias, max(bound, bias))
+    bias, bound = (max(squared + more * doubt, doubt) ** 0.5 / mean for more in (0, SURE))
+    return Error(bias, max(bound, bias), doubt / mean**2)
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,7 +122,7 @@ def _halves(scene: Scene, index: int, shader: str, settings: Settings, passes: i
     where = films[0].object_pixels() & films[1].object_pixels() & (renderer.object_id == index)
     if where.sum() < _FEW_PIXELS:
         where = renderer.object_id == index
-    variance = films[0].stderr()[where] ** 2 * passes
+    variance = np.mean([film.stderr()[where] ** 2 for film in films], axis=0) * passes
     noise = float(np.sqrt(variance.mean())) if variance.size else 0.0
     return _Halves(films[0].mean(), films[1].mean(), where, noise)
 

@@ -19,6 +19,8 @@ library into rendering, and is 5 times worse than libigl's where the radius of c
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -53,8 +55,41 @@ def mean_curvature(mesh: Mesh, rings: float = RINGS) -> NDArray[np.float64]:
     return curvature[topology.point_of_vertex]
 
 
+SHARP = np.radians(30)
+"""Least angle between the normals of two faces that meet in a sharp edge."""
+
+
+@dataclass(frozen=True)
+class Folds:
+    """How a surface bends, of int |H| dA, which sits in its edges.
+
+    sharp    share of the edges whose faces meet at more than ``SHARP``: 1 for a box, 0 for a fine ball
+    concave  share of the edges that bend inwards: 0 for convex solids, towards a half for rough surfaces
+    """
+
+    sharp: float
+    concave: float
+
+
+def folds(mesh: Mesh) -> Folds:
+    """How ``mesh`` bends; zeros where nothing does."""
+    angle, length = _edge_angles(mesh)
+    each = np.abs(angle) * length
+    total = float(each.sum())
+    if not total > 0:
+        return Folds(0.0, 0.0)
+    return Folds(float(each[np.abs(angle) > SHARP].sum()) / total, float(each[angle < 0].sum()) / total)
+
+
 def _edge_curvature(mesh: Mesh) -> NDArray[np.float64]:
     """(e,) int H dA of each edge: half its length times the signed angle between its faces' normals."""
+    angle, length = _edge_angles(mesh)
+    return 0.5 * length * angle
+
+
+def _edge_angles(mesh: Mesh) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """(e,) signed angle between the normals of each edge's faces, zero where there are not two of them, and (e,)
+    length."""
     topology = mesh.topology
     live = np.flatnonzero(topology.live)
     side_edge = topology.face_edges[live].ravel()
@@ -75,10 +110,10 @@ def _edge_curvature(mesh: Mesh) -> NDArray[np.float64]:
     # n1 x n2 lies along the edge, with the sign of the fold and the length of its sine
     length_times_sine = np.einsum("ij,ij->i", np.cross(first, second), end - start)
     length = np.linalg.norm(end - start, axis=1)
-    angle = np.arctan2(length_times_sine, length * np.einsum("ij,ij->i", first, second))
-    curvature = np.zeros(len(topology.edges))
-    curvature[pairs] = 0.5 * length * angle
-    return curvature
+    angles, lengths = np.zeros(len(topology.edges)), np.zeros(len(topology.edges))
+    angles[pairs] = np.arctan2(length_times_sine, length * np.einsum("ij,ij->i", first, second))
+    lengths[pairs] = length
+    return angles, lengths
 
 
 def _spread(mesh: Mesh, measure: NDArray, area: NDArray, rings: float) -> NDArray[np.float64]:

@@ -6,9 +6,11 @@ All that the predictions of errors and seconds go by; found from bounding box, a
 from __future__ import annotations
 
 from dataclasses import dataclass
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
+from sss_tools.curvature import Folds, folds
 from sss_tools.medium import Medium
 from sss_tools.mesh import Mesh
 
@@ -40,6 +42,15 @@ class Appearance:
     even       share of the light on it that comes from environments
     absorbed   1 - albedo', what a collision takes from the light; mean of the channels
     roundness  36 pi V^2 / A^3: 1 for a ball, 0.5 for a cube, little for what is thin or has limbs
+    sharp      share of its curvature in sharp edges, see ``sss_tools.curvature.Folds``
+    concave    share of its curvature that bends inwards
+    open       area of its holes over that of its surface; 0 for objects not checked yet
+    g          mean cosine of scattering, mean of the channels
+    ior        index of refraction, mean of the channels
+    extended   share of the light on it that comes from rectangles and balls
+    light_near radius of its bounding ball over the distance of each light, by irradiance: 0 for a sun, above 1 where
+               a light is inside
+    view_near  the same radius over the distance of the camera
     pixels     how many show it, as far as the picture reaches
     lights     how many shine on it
     """
@@ -54,6 +65,14 @@ class Appearance:
     even: float = 0.0
     absorbed: float = 0.1
     roundness: float = 1.0
+    sharp: float = 0.0
+    concave: float = 0.0
+    open: float = 0.0
+    g: float = 0.0
+    ior: float = 1.5
+    extended: float = 0.0
+    light_near: float = 0.0
+    view_near: float = 0.0
     pixels: float = 1e4
     lights: int = 1
 
@@ -67,13 +86,17 @@ def appearance(scene: Scene, thing: SceneObject) -> Appearance:
     distance = float(np.linalg.norm(position - nearest))
     centre = mesh.bounds.mean(axis=0)
     footprint = pixel_footprint(camera, max(distance, 1e-6 * mesh.diagonal))
-    depth, diffusion, absorbed = 0.0, 0.0, 1.0
+    depth, diffusion, absorbed, g, ior = 0.0, 0.0, 1.0, 0.0, 1.0
     if isinstance(thing.material, Translucent):
         medium = thing.material.medium
         depth, diffusion = _optical_size(medium, mesh.mean_inradius)
         absorbed = float(np.mean(1 - np.asarray(medium.reduced_albedo, float)))
-    unlit, even = _lighting(scene.lights, centre, position)
-    in_the_middle = pixel_footprint(camera, max(float(np.linalg.norm(position - centre)), footprint))
+        g, ior = float(np.mean(medium.g)), float(np.mean(medium.ior))
+    radius = mesh.diagonal / 2
+    lighting = _lighting(scene.lights, centre, position, mesh)
+    away = float(np.linalg.norm(position - centre))
+    in_the_middle = pixel_footprint(camera, max(away, footprint))
+    bends = _folds(mesh)
     return Appearance(
         distance=distance,
         footprint=footprint,
@@ -81,10 +104,18 @@ def appearance(scene: Scene, thing: SceneObject) -> Appearance:
         depth=depth,
         diffusion=diffusion,
         aspect=_aspect(mesh),
-        unlit=unlit,
-        even=even,
+        unlit=lighting.unlit,
+        even=lighting.even,
         absorbed=absorbed,
         roundness=_roundness(mesh),
+        sharp=bends.sharp,
+        concave=bends.concave,
+        open=thing.closedness.hole_area_fraction if thing.closedness is not None else 0.0,
+        g=g,
+        ior=ior,
+        extended=lighting.extended,
+        light_near=lighting.near,
+        view_near=radius / max(away, 1e-30) if radius > 0 else 0.0,
         pixels=_pixels(camera, mesh, in_the_middle),
         lights=max(len(scene.lights), 1),
     )
@@ -97,6 +128,19 @@ def pixel_footprint(camera: Camera, distance: float) -> float:
 
 def _roundness(mesh: Mesh) -> float:
     return min(36 * np.pi * mesh.volume**2 / mesh.area**3, 1.0) if mesh.area > 0 else 0.0
+
+
+_NEAREST = 0.1
+"""Least distance of a light from the surface that counts, in radii."""
+_FOLDS: WeakKeyDictionary[Mesh, Folds] = WeakKeyDictionary()
+"""Of meshes looked at before: the same in every frame."""
+
+
+def _folds(mesh: Mesh) -> Folds:
+    found = _FOLDS.get(mesh)
+    if found is None:
+        found = _FOLDS[mesh] = folds(mesh)
+    return found
 
 
 def _pixels(camera: Camera, mesh: Mesh, footprint: float) -> float:
@@ -129,30 +173,45 @@ def _optical_size(medium: Medium, inradius: float) -> tuple[float, float]:
     return inradius * float(extinction.mean()), float(length.mean())
 
 
-def _lighting(lights: tuple[Light, ...], centre, viewer) -> tuple[float, float]:
-    """Share of a ball's visible disk that faces away from the lights, each weighted by its irradiance; and the share
-    of the irradiance that comes from environments.
+@dataclass(frozen=True)
+class _Lighting:
+    """Of ``Appearance``: unlit, even, extended and light_near."""
 
-    Seen from V a ball lit from L shows (1 - cos(V, L))/2 of its disk unlit; environments leave nothing unlit.
+    unlit: float = 0.0
+    even: float = 0.0
+    extended: float = 0.0
+    near: float = 0.0
+
+
+def _lighting(lights: tuple[Light, ...], centre, viewer, mesh: Mesh) -> _Lighting:
+    """How a ball about ``centre`` that is as large as ``mesh`` is lit.
+
+    Unlit is the share of its visible disk that faces away from the lights, each weighted by its irradiance: seen from
+    V a ball lit from L shows (1 - cos(V, L))/2 of its disk unlit; environments leave nothing unlit.
     """
-    shares, weights, even = [], [], 0.0
+    unlit, extended, near, total, even = 0.0, 0.0, 0.0, 0.0, 0.0
     view = (viewer - centre) / max(float(np.linalg.norm(viewer - centre)), 1e-30)
     for light in lights:
         if isinstance(light, EnvironmentLight):
             seen = light.radiance if light.image is None else light.image
             even += np.pi * float(np.mean(seen)) if seen is not None else 0.0
             continue
-        offset, irradiance = _from_light(light, centre)
-        shares.append((1 - float(offset @ view)) / 2)
-        weights.append(irradiance)
-    total = sum(weights) + even
-    return (float(np.dot(shares, weights) / total), even / total) if total > 0 else (0.0, 0.0)
+        offset, irradiance = _from_light(light, centre, mesh.longest_side / 2)
+        total += irradiance
+        unlit += irradiance * (1 - float(offset @ view)) / 2
+        if isinstance(light, RectangleLight | SphereLight):
+            extended += irradiance
+        if not isinstance(light, DirectionalLight):
+            place = light.center if isinstance(light, RectangleLight | SphereLight) else light.position
+            near += irradiance * min(mesh.diagonal / 2 / max(float(np.linalg.norm(place - centre)), 1e-30), 4.0)
+    total += even
+    return _Lighting(*(one / total for one in (unlit, even, extended, near))) if total > 0 else _Lighting()
 
 
 def _from_light(
-    light: PointLight | DirectionalLight | RectangleLight | SphereLight, centre
+    light: PointLight | DirectionalLight | RectangleLight | SphereLight, centre, radius: float
 ) -> tuple[np.ndarray, float]:
-    """Unit direction to a light from ``centre``, and its mean irradiance there."""
+    """Unit direction to a light from ``centre``, and its irradiance where it is nearest to the ball around it."""
     if isinstance(light, PointLight):
         offset, strength = light.position - centre, float(np.mean(light.intensity))
     elif isinstance(light, RectangleLight):
@@ -163,4 +222,4 @@ def _from_light(
         direction = -np.asarray(light.direction, float)
         return direction / np.linalg.norm(direction), float(np.mean(light.irradiance))
     distance = max(float(np.linalg.norm(offset)), 1e-30)
-    return offset / distance, strength / distance**2
+    return offset / distance, strength / max(abs(distance - radius), _NEAREST * radius, 1e-30) ** 2

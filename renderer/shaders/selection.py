@@ -10,7 +10,8 @@ diffuse fallback as they recede. A shader with error b is good enough up to n = 
 that size its samples turn into the next one's, camera sample by camera sample, so that nothing pops and no frame needs
 to know the one before. The errors are those of ``prediction``, or measured by pilots.
 
-Where the number of passes is not given it follows as well: as many as path needs for its noise to be within e.
+Where the number of passes is not given it follows as well: as many as path needs for its noise to be within e in nine
+of ten cases. The first passes then tell how many are enough (``renderer.enough``).
 """
 
 from __future__ import annotations
@@ -32,7 +33,8 @@ CHEAPEST_FIRST = ("diffuse", "scalar", "plumb", "path")
 FADE = 0.15
 """Relative distance from a threshold, in sizes or errors, within which both shaders have samples."""
 MOST_PASSES = 16384
-"""Passes are 1 / (e^2 / noise^2 + 1 / this): never as many, and yet more for every higher quality."""
+"""Passes are n / sqrt(1 + (n / this)^2) for the n = (noise / e)^2 that are needed: never more than this, more for every
+higher quality, and not far from enough up to half of it."""
 
 
 @dataclass(frozen=True)
@@ -66,6 +68,7 @@ class Plan:
     tolerance           relative error allowed; None for opaque objects
     shares              of its camera samples that each shader lights: one, or several near a threshold
     passes              that its chosen shaders need, or those given
+    noise_allowed       to path where it lights the object: within the tolerance, and less than others are wrong by
     candidates          cheapest first; none for opaque objects and those without an inside
     """
 
@@ -82,6 +85,7 @@ class Plan:
     tolerance: float | None = None
     shares: dict[str, float] = field(default_factory=dict)
     passes: int = 1
+    noise_allowed: float | None = None
     candidates: tuple[Candidate, ...] = ()
 
 
@@ -134,7 +138,14 @@ def tolerance(quality: float, size_px: float) -> float:
 
 def passes_within(noise: float, allowed: float) -> int:
     """Camera samples a pixel after which their mean is noisy by ``allowed``, see ``MOST_PASSES``."""
-    return math.ceil(1 / ((allowed / max(noise, 1e-6)) ** 2 + 1 / MOST_PASSES) - 1e-9)
+    return math.ceil(1 / math.hypot((allowed / max(noise, 1e-6)) ** 2, 1 / MOST_PASSES) - 1e-9)
+
+
+def noise_allowed(allowed: float, others: Sequence[float]) -> float:
+    """The noise that path may have within ``allowed``, where it is chosen over shaders with the errors ``others``: a
+    dearer picture that is noisier than the cheaper one would be wrong is of use to nobody. As many passes as both need
+    together, so that more quality is always more of them."""
+    return 1 / math.hypot(1 / allowed, 1 / min(others, default=math.inf))
 
 
 def picture_passes(plans: Sequence[Plan]) -> int:
@@ -197,7 +208,7 @@ class _Chooser:
         handling, because = _handling(thing, self.hole_handling)
         wanted = thing.shader if self.shader == "auto" else self.shader
         warning, error, passes = None, None, fast_passes
-        candidates = () if handling == "surface" else self._candidates(thing, look, allowed)
+        candidates = () if handling == "surface" else self._candidates(thing, look, allowed, wanted == "auto")
         if handling == "surface":
             shares, reason = {"diffuse": 1.0}, "the mesh encloses no volume, so there is no inside for light"
             if wanted != "auto":
@@ -210,6 +221,7 @@ class _Chooser:
             bounds = {one.shader: one.error_bound for one in candidates}
             shares = shares_of(bounds, self.demand, look.size_px, _fades(thing))
             reason = self._reason(shares, candidates, allowed, look.size_px)
+        quiet = noise_allowed(allowed, [one.predicted_error for one in candidates[:-1]] if wanted == "auto" else [])
         if candidates:
             chosen = [(shares[one.shader], one) for one in candidates if one.shader in shares]
             error = sum(share * one.predicted_error for share, one in chosen)
@@ -228,16 +240,19 @@ class _Chooser:
             tolerance=allowed,
             shares=shares,
             passes=passes,
+            noise_allowed=quiet,
             candidates=candidates,
         )
 
-    def _candidates(self, thing: SceneObject, look: Appearance, allowed: float) -> tuple[Candidate, ...]:
+    def _candidates(self, thing: SceneObject, look: Appearance, allowed: float, free: bool) -> tuple[Candidate, ...]:
         found = self.measured.get(thing.name)
         errors = found.errors if found else predicted_errors(look)
         noise = found.noise if found else predicted_noise(look)
+        quiet = noise_allowed(allowed, [error.error for error in errors.values()] if free else [])
         candidates = []
         for name in CHEAPEST_FIRST:
-            passes = self.passes or passes_within(noise.error if name == "path" else FAST_NOISE, allowed)
+            needed = passes_within(noise.bound, quiet) if name == "path" else passes_within(FAST_NOISE, allowed)
+            passes = self.passes or needed
             error = errors.get(name) or Error(noise.error * passes**-0.5, noise.bound * passes**-0.5)
             seconds = predicted_seconds(name, thing, look, passes, self.threads)
             candidates.append(Candidate(name, error.error, error.bound, passes, seconds, found is not None))
@@ -289,7 +304,8 @@ def thresholds(scene: Scene, thing: SceneObject, quality: float = DEFAULT_QUALIT
     chosen = []
     for distance in distances:
         footprint = pixel_footprint(camera, float(distance))
-        there = replace(look, footprint=footprint, size_px=size / footprint)
+        near = thing.mesh.diagonal / 2 / float(distance)
+        there = replace(look, footprint=footprint, size_px=size / footprint, view_near=near)
         bounds = {name: error.bound for name, error in predicted_errors(there).items()}
         shares = shares_of(bounds, Demand(quality), there.size_px, _fades(thing))
         chosen.append(max(shares, key=shares.__getitem__))

@@ -102,7 +102,8 @@ def _guide(scene: TracedScene, thing: TracedObject) -> Guide | None:
     """Guided flights, where light comes out of the medium as it went in: from lights all around, not from one point."""
     medium = thing.medium
     assert medium is not None
-    albedo = float(medium.single_scattering_albedo.mean())
+    # of the brightest channel: guided by a darker one, its paths multiply weights without end, and few carry most of it
+    albedo = float(medium.single_scattering_albedo.max())
     sigma_t = float(medium.sigma_t[0])
     if (
         medium.g != 0

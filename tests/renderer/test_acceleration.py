@@ -159,6 +159,13 @@ def test_guides_are_chosen_where_absorption_shapes_the_light():
     assert chosen(dense((0.8, 0.8, 0.8), g=0.3)).guides == (None,)
 
 
+def test_flights_are_guided_by_the_brightest_channel():
+    """By a darker one's guide the weights of its long paths grow without end: seven times the noise in a ball of these
+    albedos under an even sky."""
+    colourful, bright = (chosen(dense(albedo)).guides[0] for albedo in ((0.989, 0.9, 0.85), (0.989,) * 3))
+    assert (colourful.nu0, colourful.share) == (bright.nu0, bright.share) and bright.share == 0.5
+
+
 def test_what_is_chosen_does_not_depend_on_the_number_of_passes():
     """There is no way to ask for it: parts of a render must agree bit for bit."""
     of = scene([placed(box((1, 1, 1)), translucent([0.9] * 3, 5.0, 0.0, 1.3))], [WHITE_SKY], VIEW)

@@ -105,6 +105,21 @@ def test_an_interrupt_writes_the_picture_and_keeps_the_film_for_resume(tmp_path)
     assert not checkpoint_path(out).exists()
 
 
+def test_an_interrupted_npz_is_its_own_checkpoint(tmp_path, monkeypatch):
+    """An older one beside it would be resumed in its place."""
+    monkeypatch.setattr(job, "REFRESH_EVERY", 0.0)
+
+    def interrupt(done, total, text):
+        if done == 3:
+            raise KeyboardInterrupt
+
+    out = tmp_path / "out.npz"
+    with pytest.raises(KeyboardInterrupt):
+        execute(ready(), out, Budget(0, 10), progress=interrupt)
+    assert image.read(out).film.ranges == ((0, 3),)
+    assert not checkpoint_path(out).exists()
+
+
 def test_a_finished_render_resumed_is_written_again_without_a_pass(tmp_path):
     out = tmp_path / "out.npz"
     execute(ready(), out, Budget(0, 2))
