@@ -36,7 +36,7 @@ SHADER_ID = {"path": 0, "plumb": 1, "scalar": 2, "diffuse": 3}
 """In pictures; opaque objects and the background have -1."""
 _STRIP, _FRAME_STRIP = 2**13, 2**19
 """Camera samples of a strip, at most: where paths walk, it is kept until the longest has ended; frames of fast shaders
-are done faster in large pieces."""
+are done faster in large pieces, of at least ``_STRIP`` and at most this."""
 
 
 @dataclass(frozen=True)
@@ -138,7 +138,9 @@ class Renderer:
         """
         threads = self.settings.threads or os.cpu_count() or 1
         pixels = np.arange(self.film.hits.size) if chosen is None else np.flatnonzero(chosen)
-        longest = _STRIP if self._frames is None else min(len(pixels) // (2 * threads) + 1, _FRAME_STRIP)
+        longest = _STRIP
+        if self._frames is not None:
+            longest = min(max(len(pixels) // (2 * threads) + 1, _STRIP), _FRAME_STRIP)
         strips = Strips(passes, pixels, threads, longest, seconds_left)
         assembly, results = Assembly(len(pixels)), SimpleQueue[TracedStrip | BaseException | None]()
         tracing = threads

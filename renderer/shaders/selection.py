@@ -6,9 +6,10 @@ Funkhouser & Sequin 1993, SIGGRAPH):
     e0 = 0.3 * 10^(-2 q),    e = e0 (1 + 64 / n)
 
 so that what is small in the picture may be rougher, and objects fall from path through plumb and scalar to the
-diffuse fallback as they recede. A shader with error b is good enough up to n = 64 / (b / e0 - 1). Within ``FADE`` of
-that size its samples turn into the next one's, camera sample by camera sample, so that nothing pops and no frame needs
-to know the one before. The errors are those of ``prediction``, or measured by pilots.
+diffuse fallback as they recede. A shader with error b is good enough up to n = 64 / (b / e0 - 1). Within a factor
+``FADE`` of that size its samples turn into the next one's, camera sample by camera sample, so that nothing pops and no
+frame needs to know the one before; what a share s of them is wrong by, s b, stays below 0.6 e. The errors are those of
+``prediction``, or measured by pilots.
 
 Where the number of passes is not given it follows as well: as many as path needs for its noise to be within e in nine
 of ten cases. The first passes then tell how many are enough (``renderer.enough``).
@@ -30,8 +31,9 @@ from .prediction import FAST_NOISE, Error, predicted_errors, predicted_noise
 
 DEFAULT_QUALITY = 0.5
 CHEAPEST_FIRST = ("diffuse", "scalar", "plumb", "path")
-FADE = 0.15
-"""Relative distance from a threshold, in sizes or errors, within which both shaders have samples."""
+FADE = 2.2
+"""Factor around a threshold, in sizes or errors, within which both shaders have samples: so wide that shaders a tenth
+apart change an object by less than a hundredth while it recedes by a tenth."""
 MOST_PASSES = 16384
 """Passes are n / sqrt(1 + (n / this)^2) for the n = (noise / e)^2 that are needed: never more than this, more for every
 higher quality, and not far from enough up to half of it."""
@@ -111,17 +113,17 @@ class Demand:
     def share(self, error: float, size_px: float, fade: bool = True) -> float:
         """Share of the camera samples for which a shader so far off is good enough.
 
-        1 while the object is small or the shader right, 0 beyond, and a smooth step between (with ``fade``): around
-        the threshold in sizes, and just below it where it is an error that must not be exceeded.
+        1 while the object is small or the shader right, 0 beyond, and a smooth step between (with ``fade``) in the
+        logarithm: around the threshold in sizes, and just below it where it is an error that must not be exceeded.
         """
         if self.target_error is None:
             allowed = tolerance(self.quality, math.inf)
             beyond = max(size_px, 1e-3) * (error / allowed - 1) / 64
         else:
-            beyond = error / self.target_error * (1 + FADE if fade else 1)
-        if not fade:
+            beyond = error / self.target_error * (FADE if fade else 1)
+        if not fade or beyond <= 0:
             return float(beyond <= 1)
-        t = min(max((beyond - 1 + FADE) / (2 * FADE), 0.0), 1.0)
+        t = min(max((math.log(beyond) / math.log(FADE) + 1) / 2, 0.0), 1.0)
         return 1 - t * t * (3 - 2 * t)
 
     def __str__(self) -> str:

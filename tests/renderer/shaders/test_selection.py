@@ -212,8 +212,8 @@ def test_a_share_is_half_at_the_threshold_and_whole_beyond_the_fade():
     threshold = 64 / (0.06 / 0.03 - 1)
     assert demand.tolerance(threshold) == pytest.approx(0.06)
     assert demand.share(0.06, threshold) == pytest.approx(0.5)
-    assert demand.share(0.06, threshold * (1 - FADE)) == 1 and demand.share(0.06, threshold * (1 + FADE)) == 0
-    assert 0 < demand.share(0.06, threshold * (1 + 0.9 * FADE)) < 0.1
+    assert demand.share(0.06, threshold / FADE) == 1 and demand.share(0.06, threshold * FADE) == 0
+    assert 0 < demand.share(0.06, threshold * FADE**0.9) < 0.1
     assert demand.share(0.02, 1e9) == 1  # right enough at any size
     assert [demand.share(0.06, threshold * k, fade=False) for k in (0.99, 1.01)] == [1, 0]
 
