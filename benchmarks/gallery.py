@@ -1,6 +1,6 @@
 """Makes docs/gallery.md: every example's picture, under the question that it answers.
 
-    python benchmarks/gallery.py [--bunny FILE] [-o FOLDER]
+    python benchmarks/gallery.py [--bunny FILE] [--only EXAMPLE ...] [-o FOLDER]
 
 Runs the scripts of examples/ one after the other as a reader would, and keeps their pictures as JPEG below
 FOLDER/images/gallery; the words are those of the scripts. An example that cannot be made (the bunny, without a network)
@@ -41,7 +41,10 @@ def main() -> int:
     """The command; 1 where an example was left out."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--bunny", type=Path, help="the Stanford bunny, where it is here already")
-    parser.add_argument("--words", action="store_true", help="only write the page, about the pictures that are there")
+    made = [example for example in EXAMPLES if example not in TIMED]
+    parser.add_argument(
+        "--only", nargs="*", choices=made, default=made, metavar="EXAMPLE", help="make these, or none, and the page"
+    )
     parser.add_argument("-o", "--output", type=Path, default=ROOT / "docs")
     options = parser.parse_args()
     pictures = options.output / "images" / "gallery"
@@ -50,8 +53,8 @@ def main() -> int:
         folder = Path(name)
         if options.bunny is not None:
             shutil.copy(options.bunny, folder / "stanford-bunny.obj")
-        for example, more in EXAMPLES.items():
-            if example not in TIMED and not options.words and run(example, folder, more):
+        for example in options.only:
+            if run(example, folder, EXAMPLES[example]):
                 save(folder / f"{example}.png", pictures / f"{example}.jpg")
                 print(example, flush=True)
     places = {example: f"images/gallery/{example}.jpg" for example in EXAMPLES}

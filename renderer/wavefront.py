@@ -31,6 +31,7 @@ from .tracing.roulette import play_at_surfaces
 from .tracing.streams import Uniforms, stream_keys
 from .tracing.tally import Tally
 from .tracing.traced_scene import TracedScene
+from .tracing.transport import Transport
 
 Float32 = NDArray[np.float32]
 BLOCK = 131072
@@ -68,17 +69,21 @@ class Wavefront:
         block = max(block, 2)  # a path and its branch
         self._uniforms = Uniforms(block)
         self._tally = Tally()
-        self._flying, self._standing = (Paths(block, scene.media.count) for _ in range(2))
+        self._columns, self._beams = Columns(block), list[Beam]()
+        self._places = [self._place(block) for _ in range(2 + scene.media.count)]
+        self._outside, self._at_surfaces, *in_media = self._places
+        self._flying, self._standing = self._outside.paths, self._at_surfaces.paths
         chosen = acceleration or Acceleration.none(scene.media.count)
-        self._walks = [
-            MediumWalk(scene, slot, block, self._uniforms, self._tally, chosen) for slot in range(scene.media.count)
-        ]
+        self._walks = [MediumWalk(place, slot, chosen) for slot, place in enumerate(in_media)]
         self._fast_bodies, self._blends = fast_bodies, blends or {}
         self._beams_of_pass = bool(self._fast_bodies or self._blends)
-        self._columns, self._beams = Columns(block), list[Beam]()
         self._emitted = self._noted = self._steps = 0
         # how each object answers a ray, for scenes with more than one kind of surface
         self._kind = [thing.shader for thing in scene.objects]
+
+    def _place(self, block: int) -> Transport:
+        paths = Paths(block, self.scene.media.count)
+        return Transport(self.scene, paths, self._uniforms, self._tally, self._columns.radiance)
 
     def trace(self, strips: Strips) -> Iterator[TracedStrip]:
         """Trace strips until there are no more, or they are stopped; each is given back when its last path has
@@ -109,14 +114,14 @@ class Wavefront:
         """Forget all paths and make room for strips of at most so many samples."""
         if not self._columns.fit(longest):
             self._columns = Columns(longest)
+            for place in self._places:
+                place.radiance = self._columns.radiance
         self._columns.clear()
         self._choices = Choices(self._blends, self._columns.count) if self._blends else None
         self._emitted = self._noted = self._steps = 0
         self._turn = -1
-        for place in (self._flying, self._standing):
-            place.clear()
-        for walk in self._walks:
-            walk.paths.clear()
+        for place in self._places:
+            place.paths.clear()
 
     def _emit(self, strips: Strips, room: int) -> None:
         """Emit the next camera samples, at most so many."""
@@ -152,8 +157,8 @@ class Wavefront:
 
     def _ended(self) -> Iterator[TracedStrip]:
         """The strips whose paths have all ended."""
-        places = (self._flying, self._standing, *(walk.paths for walk in self._walks))
-        for strip, radiance, first_object in self._columns.ended(paths.sample for paths in places):
+        alive = (place.paths.sample for place in self._places)
+        for strip, radiance, first_object in self._columns.ended(alive):
             tally = self._tally.take()
             tally.samples = len(first_object)
             yield TracedStrip(strip, radiance, first_object, tally)
@@ -162,7 +167,7 @@ class Wavefront:
         """Take the paths of the fullest place one event further."""
         places = [(self._flying.count, self._fly), (self._standing.count, self._stand)]
         for walk in self._walks:
-            places.append((walk.paths.count, partial(walk.step, self._standing, self._columns.radiance)))
+            places.append((walk.paths.count, partial(walk.step, self._standing)))
         _, step = max(places, key=itemgetter(0))
         step()
         self._steps += 1
@@ -175,8 +180,7 @@ class Wavefront:
         escaped = np.flatnonzero(triangle == -1)
         lights = self.scene.lights
         density = paths.density[escaped] if lights.skies else None
-        background = lights.background(paths.direction[:, escaped], density)
-        self._columns.radiance[:, paths.sample[escaped]] += paths.throughput[:, escaped] * background
+        self._outside.add(escaped, lights.background(paths.direction[:, escaped], density))
         np.copyto(distance, 0, where=triangle == -1)
         paths.origin += paths.direction * distance
         if lights.sampled:
@@ -217,9 +221,9 @@ class Wavefront:
             if not len(who):
                 continue
             if kind == "opaque":
-                meet_diffuse(scene, paths, who, faces, self._uniforms, self._tally, self._columns.radiance)
+                meet_diffuse(self._at_surfaces, who, faces)
             elif kind == "mirror":
-                meet_mirror(scene, paths, who, faces)
+                meet_mirror(self._at_surfaces, who, faces)
             elif k in self._blends:
                 assert self._choices is not None
                 chosen = self._choices.of(k, paths.sample[who])
@@ -236,12 +240,10 @@ class Wavefront:
         """What a translucent object does to paths that meet it, lit by path where ``body`` is None."""
         if not len(who):
             return
-        arguments = (self.scene, self._standing, who, faces)
-        counts = (self._uniforms, self._tally, self._columns.radiance)
         if body is None:
-            meet_boundary(*arguments, *counts)
+            meet_boundary(self._at_surfaces, who, faces)
         else:
-            body.meet(*arguments, self._beams, *counts)
+            body.meet(self._at_surfaces, who, faces, self._beams)
 
     def _note_first(self, index: NDArray[np.intp], thing: NDArray[np.int16]) -> None:
         # of a split path one branch is enough
@@ -277,4 +279,4 @@ class Wavefront:
             who = index[drawn]
             vertex = paths.origin[:, who] - paths.flown[who] * paths.direction[:, who]
             share[drawn] = power_heuristic(paths.density[who], light.density(vertex))
-        self._columns.radiance[:, paths.sample[index]] += paths.throughput[:, index] * light.radiance * share
+        self._at_surfaces.add(index, light.radiance, share)

@@ -86,7 +86,7 @@ def _close(thing: SceneObject, shader: str, handling: str, reason: str) -> tuple
         return thing, HoleReport(handling, reason)
     sealed = seal(thing.mesh, caps=handling == "cap")
     if sealed.turned:
-        reason += f"; {sealed.turned} faces turned outwards"
+        reason += f"; {sealed.turned} {'face' if sealed.turned == 1 else 'faces'} turned outwards"
     if handling == "cap":
         handling, reason = _after_capping(sealed, reason)
     closed = closedness.state == "closed" or (handling == "cap" and sealed.closed)
@@ -115,11 +115,14 @@ def _after_capping(sealed: Sealed, reason: str) -> tuple[str, str]:
     left = [loop for loop in sealed.loops if not loop.capped]
     if not left:
         return "cap", reason
+    count, whole = len(left), len(sealed.loops)
+    which = f"{count} of {whole} caps" if count < whole else "its cap" if whole == 1 else f"all {whole} caps"
+    closes = "that it closes" if count == 1 else "that they close"
     places = ", ".join("(" + ", ".join(f"{x:.4g}" for x in loop.centroid) + ")" for loop in left[:NAMED])
-    more = ", ..." if len(left) > NAMED else ""
-    unfit = f"{len(left)} of {len(sealed.loops)} caps would pass through the surface they close, around {places}{more}"
-    kept = "cap" if len(left) < len(sealed.loops) else "terminate"
-    return kept, f"{reason}; {unfit}: paths that leave there take the material's colour"
+    more = ", ..." if count > NAMED else ""
+    unfit = f"{which} would pass through the surface {closes}, around {places}{more}"
+    kept = "cap" if count < whole else "terminate"
+    return kept, f"{reason}; but {unfit}: paths that leave there take the material's colour"
 
 
 def expected_error(loops: Sequence[Loop], area: float) -> float | None:

@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 from ..optics.dielectric import fresnel_reflectance
 from ..optics.microfacet import sample_visible_facet, unmasked
 from ..tracing.paths import CHANCE, OUTSIDE, REFLECTS, REFRACTS, WHOLE, Paths
-from ..tracing.streams import Uniforms, branch_streams
-from ..tracing.tally import Tally
+from ..tracing.streams import branch_streams
 from ..tracing.traced_scene import TracedScene, offset_from
+from ..tracing.transport import Transport
 from .blend import Choices
 from .crossings import Crossings
 from .local_frame import LocalFrame
@@ -42,31 +42,24 @@ def split(scene: TracedScene, paths: Paths, samples: int, choices: Choices | Non
         paths.sample[copies] += np.int32(samples)
 
 
-def meet_boundary(
-    scene: TracedScene,
-    paths: Paths,
-    index: NDArray[np.intp],
-    triangle: NDArray[np.int32],
-    uniforms: Uniforms,
-    tally: Tally,
-    radiance: Float32,
-) -> None:
+def meet_boundary(transport: Transport, index: NDArray[np.intp], triangle: NDArray[np.int32]) -> None:
     """Reflect or refract the paths ``index`` where they meet ``triangle`` (m,); their origins are the hit points.
 
     Paths whose crossing contradicts a closed surface end.
     """
+    scene, paths = transport.scene, transport.paths
     at = Crossings.of(scene, paths, index, triangle)
     lost = at.contradictory(scene)
     if lost.any():
         for slot in np.unique(at.slot[lost]):
             mine = index[lost & (at.slot == slot)]
-            lose(scene, paths, mine, int(slot), uniforms, tally, radiance)
+            lose(transport, mine, int(slot))
             if scene.translucent[slot].taken_for_closed:
-                tally.contradicted += len(mine)
+                transport.tally.contradicted += len(mine)
         at = at.take(np.flatnonzero(~lost))
     if not len(at.index):
         return
-    choice, u1 = uniforms.draw_at(paths.stream, at.index)
+    choice, u1 = transport.draw(at.index)
     straight = at.eta == 1
     roughness = np.array([thing.roughness for thing in scene.translucent], np.float32)[at.slot]
     rough = ~straight & (roughness > 0)
@@ -86,9 +79,9 @@ def meet_boundary(
     for slot, thing in enumerate(scene.translucent) if rough.any() else ():
         mine = np.flatnonzero(rough & (at.slot == slot))
         if len(mine):
-            u2, _ = uniforms.draw_at(paths.stream, at.index[mine])
+            u2, _ = transport.draw(at.index[mine])
             turned[:, mine], reflected[mine], density[mine] = _scatter_rough(
-                scene, paths, at.take(mine), thing.roughness, choice[mine], u1[mine], u2, uniforms, tally, radiance
+                transport, at.take(mine), thing.roughness, choice[mine], u1[mine], u2
             )
     # only now: both branches of a path must have met the same facet
     copies = at.index[paths.branch[at.index] == REFLECTS]
@@ -164,21 +157,21 @@ def _weigh(paths: Paths, index, reflectance: Float32, chance: Float32, reflected
 
 
 def _scatter_rough(
-    scene: TracedScene, paths: Paths, at: Crossings, alpha: float, choice, u1, u2, uniforms: Uniforms, tally: Tally,
-    radiance: Float32,
-) -> tuple[Float32, NDArray[np.bool_], Float32]:  # fmt: skip
+    transport: Transport, at: Crossings, alpha: float, choice: Float32, u1: Float32, u2: Float32
+) -> tuple[Float32, NDArray[np.bool_], Float32]:
     """GGX reflection or refraction, after lights were connected; weighs the throughputs.
 
     Returns directions (3, n), whether they are reflected, and ``Paths.density``.
 
     With visible facets drawn, the weight of the scattered direction is its own masking G1 (Heitz 2018, eq. 19).
     """
+    scene, paths = transport.scene, transport.paths
     frame = LocalFrame(at.facing)
     view = frame.to_local(-at.direction)
     if scene.lights.points or scene.lights.sampled:
         # of a path that was split, one branch speaks for both
         speaks = np.flatnonzero(paths.branch[at.index] != REFLECTS)
-        light_rough(scene, paths, at.take(speaks), frame.take(speaks), view[:, speaks], uniforms, tally, radiance)
+        light_rough(transport, at.take(speaks), frame.take(speaks), view[:, speaks])
     facet = sample_visible_facet(view, alpha, u1, u2)
     share = _reflected_share(scene, at.slot)
     turned, reflected = _turn(-view, facet, at.eta, choice, paths, at.index, share)

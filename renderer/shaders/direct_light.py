@@ -9,11 +9,9 @@ from numpy.typing import NDArray
 
 from ..optics.multiple_importance import power_heuristic
 from ..scene.lights import Illumination
-from ..tracing.paths import Paths
 from ..tracing.shadow import transmittance
-from ..tracing.streams import Uniforms
-from ..tracing.tally import Tally
-from ..tracing.traced_scene import TracedScene, offset_from
+from ..tracing.traced_scene import offset_from
+from ..tracing.transport import Transport
 
 Float32 = NDArray[np.float32]
 
@@ -23,13 +21,12 @@ what isotropic scattering has."""
 
 
 def received(
-    scene: TracedScene,
+    transport: Transport,
     position: Float32,
     normal: Float32,
     light: Illumination,
     inside: NDArray[np.int8],
     owner: NDArray[np.int16],
-    tally: Tally,
 ) -> Float32:
     """(3, n) irradiance across the beam of ``light`` at surface points, after shadows.
 
@@ -37,20 +34,19 @@ def received(
     inside, owner  what that side is inside of, see ``Paths``
     """
     origin = offset_from(position, normal, np.ones(position.shape[1], np.float32))
-    return light.irradiance * transmittance(scene, origin, light, inside, owner, tally)
+    return light.irradiance * transmittance(transport.scene, origin, light, inside, owner, transport.tally)
 
 
-def arriving(scene: TracedScene, position: Float32, draw, skies: bool = False) -> Iterator[Illumination]:
-    """One beam from each light: all of a point light, a random part of the others.
-
-    draw   called without arguments, returns two (n,) uniforms
-    skies  whether environments that are worth it are sampled too
-    """
-    lights = scene.lights
+def arriving(
+    transport: Transport, index: NDArray[np.intp], position: Float32, skies: bool = False
+) -> Iterator[Illumination]:
+    """One beam from each light to the paths ``index`` at ``position`` (3, n): all of a point light, a random part of
+    the others; with ``skies`` environments that are worth it are sampled too."""
+    lights = transport.scene.lights
     for source in lights.points:
         yield source.illuminate(position)
     for sampled in (*lights.rectangles, *lights.spheres, *(lights.skies if skies else ())):
-        yield sampled.sample(position, *draw())
+        yield sampled.sample(position, *transport.draw(index))
 
 
 def pick(light: Illumination, columns: NDArray[np.intp]) -> Illumination:
@@ -61,12 +57,7 @@ def pick(light: Illumination, columns: NDArray[np.intp]) -> Illumination:
 
 
 def worthwhile(
-    paths: Paths,
-    index: NDArray[np.intp],
-    light: Illumination,
-    value: Float32,
-    drawn: Float32,
-    uniforms: Uniforms,
+    transport: Transport, index: NDArray[np.intp], light: Illumination, value: Float32, drawn: Float32
 ) -> tuple[NDArray[np.intp], Float32]:
     """Which connections of the paths ``index`` to ``light`` are followed, columns of it, and their weights.
 
@@ -81,7 +72,7 @@ def worthwhile(
         return columns, value[columns]
     columns = np.flatnonzero((value > 0) & (light.density > 0))
     weight = value[columns] * power_heuristic(light.density[columns], drawn[columns])
-    chance = np.minimum(paths.throughput[:, index[columns]].max(axis=0) * weight / FAINT, 1)
-    u, _ = uniforms.draw_at(paths.stream, index[columns])
+    chance = np.minimum(transport.paths.throughput[:, index[columns]].max(axis=0) * weight / FAINT, 1)
+    u, _ = transport.draw(index[columns])
     keep = np.flatnonzero(u < chance)
     return columns[keep], weight[keep] / chance[keep]

@@ -17,9 +17,8 @@ from ..optics.dielectric import fresnel_reflectance
 from ..optics.microfacet import sample_visible_facet, turning, unmasked
 from ..scene.beams import Beam
 from ..tracing.paths import Paths
-from ..tracing.streams import Uniforms
-from ..tracing.tally import Tally
 from ..tracing.traced_scene import TracedObject, TracedScene, offset_from
+from ..tracing.transport import Transport
 from . import plumb, scalar
 from .direct_light import arriving, pick, received, worthwhile
 from .local_frame import LocalFrame
@@ -73,23 +72,15 @@ class FastBody:
     ambient: Float32 | None = None
 
     def meet(
-        self,
-        scene: TracedScene,
-        paths: Paths,
-        index: NDArray[np.intp],
-        triangle: NDArray[np.int32],
-        beams: Sequence[Beam],
-        uniforms: Uniforms,
-        tally: Tally,
-        radiance: Float32,
+        self, transport: Transport, index: NDArray[np.intp], triangle: NDArray[np.int32], beams: Sequence[Beam]
     ) -> None:
         """Add the body's scattered light to the paths ``index`` that meet it, and send them on by reflection."""
+        scene, paths = transport.scene, transport.paths
         at = _Arrival.of(scene, paths, index, triangle)
         view_cosine = np.clip(-np.einsum("ij,ij->j", at.direction, at.normal), np.float32(1e-4), 1)
         points = self._points(scene, at.position, at.normal, triangle, -at.direction)
         exitance = self.exitance(scene, points, paths.throughput[:, index].max(axis=0), beams)
-        leaving = outgoing_radiance(exitance, view_cosine, self.optics.ior)
-        radiance[:, paths.sample[index]] += paths.throughput[:, index] * leaving
+        transport.add(index, outgoing_radiance(exitance, view_cosine, self.optics.ior))
         assert self.thing.medium is not None
         eta = float(self.thing.medium.ior)
         if eta == 1:
@@ -99,7 +90,7 @@ class FastBody:
             paths.throughput[:, index] *= reflectance
             self._send_on(paths, at, at.direction + 2 * view_cosine * at.normal)
         else:
-            self._reflect_rough(scene, paths, at, uniforms, tally, radiance)
+            self._reflect_rough(transport, at)
 
     def exitance(
         self, scene: TracedScene, points: SurfacePoints, throughput: Float32, beams: Sequence[Beam]
@@ -123,26 +114,25 @@ class FastBody:
         ambient = None if self.ambient is None else np.einsum("ij,jik->kj", weights, self.ambient[face])
         return SurfacePoints(position, normal, curvature, viewer, ambient)
 
-    def _reflect_rough(
-        self, scene: TracedScene, paths: Paths, at: _Arrival, uniforms: Uniforms, tally: Tally, radiance: Float32
-    ) -> None:
+    def _reflect_rough(self, transport: Transport, at: _Arrival) -> None:
         """The reflecting half of the GGX boundary, with the highlights of lights."""
+        scene, paths = transport.scene, transport.paths
         index, alpha, eta = at.index, self.thing.roughness, self.optics.ior
         frame = LocalFrame(at.normal)
         view = frame.to_local(-at.direction)
         view[2] = np.maximum(view[2], np.float32(1e-4))
-        for light in arriving(scene, at.position, lambda: uniforms.draw_at(paths.stream, index), skies=True):
+        for light in arriving(transport, index, at.position, skies=True):
             to_light = frame.to_local(light.direction)
             drawn, share = turning(view, to_light, eta, alpha)
             above = (to_light[2] > 0) & (np.einsum("ij,ij->j", at.facing, light.direction) > 0)
             value = np.where(above, drawn * share * unmasked(to_light[2], alpha), 0)
-            lit, weight = worthwhile(paths, index, light, value, drawn, uniforms)
+            lit, weight = worthwhile(transport, index, light, value, drawn)
             if len(lit):
                 who = index[lit]
-                arrived = received(scene, at.position[:, lit], at.facing[:, lit], pick(light, lit),
-                                   paths.inside[:, who], paths.owner[who], tally)  # fmt: skip
-                radiance[:, paths.sample[who]] += paths.throughput[:, who] * arrived * weight
-        u1, u2 = uniforms.draw_at(paths.stream, index)
+                arrived = received(transport, at.position[:, lit], at.facing[:, lit], pick(light, lit),
+                                   paths.inside[:, who], paths.owner[who])  # fmt: skip
+                transport.add(who, arrived, weight)
+        u1, u2 = transport.draw(index)
         facet = sample_visible_facet(view, alpha, u1, u2)
         cos_in = np.clip(np.einsum("ij,ij->j", view, facet), 0, 1)
         reflectance, _ = fresnel_reflectance(cos_in, eta)

@@ -6,10 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..optics.phase import around, spherical
-from ..tracing.paths import CHANCE, Paths
-from ..tracing.streams import Uniforms
-from ..tracing.tally import Tally
-from ..tracing.traced_scene import TracedScene, offset_from
+from ..tracing.paths import CHANCE
+from ..tracing.traced_scene import offset_from
+from ..tracing.transport import Transport
 from .direct_light import arriving, pick, received, worthwhile
 
 Float32 = NDArray[np.float32]
@@ -21,19 +20,12 @@ def cosine_direction(normal: Float32, u1: Float32, u2: Float32) -> Float32:
     return around(normal, spherical(np.sqrt(1 - u1), u2, np.empty_like(normal)))
 
 
-def meet_diffuse(
-    scene: TracedScene,
-    paths: Paths,
-    index: Indices,
-    triangle: NDArray[np.int32],
-    uniforms: Uniforms,
-    tally: Tally,
-    radiance: Float32,
-) -> None:
+def meet_diffuse(transport: Transport, index: Indices, triangle: NDArray[np.int32]) -> None:
     """Light the Lambertian points where the paths ``index`` are, and send the paths on by the cosine.
 
     Lights with an extent are found both ways: sampled here, and met by the path that goes on. Even skies are only met.
     """
+    scene, paths = transport.scene, transport.paths
     geometric = np.take(scene.triangle_normal, triangle, axis=1)
     direction, position = paths.direction[:, index], paths.origin[:, index]
     side = -np.copysign(np.float32(1), np.einsum("ij,ij->j", direction, geometric))
@@ -41,15 +33,15 @@ def meet_diffuse(
     shading = scene.shading_normal(position, triangle) * side
     reflectance = scene.reflectance[:, scene.triangle_object[triangle]]
     paths.throughput[:, index] *= reflectance
-    for light in arriving(scene, position, lambda: uniforms.draw_at(paths.stream, index), skies=True):
+    for light in arriving(transport, index, position, skies=True):
         value = _lambert(shading, facing, light.direction)
-        lit, weight = worthwhile(paths, index, light, value, value, uniforms)
+        lit, weight = worthwhile(transport, index, light, value, value)
         if len(lit):
             who = index[lit]
-            arrived = received(scene, position[:, lit], facing[:, lit], pick(light, lit),
-                               paths.inside[:, who], paths.owner[who], tally)  # fmt: skip
-            radiance[:, paths.sample[who]] += paths.throughput[:, who] * arrived * weight
-    u1, u2 = uniforms.draw_at(paths.stream, index)
+            arrived = received(transport, position[:, lit], facing[:, lit], pick(light, lit),
+                               paths.inside[:, who], paths.owner[who])  # fmt: skip
+            transport.add(who, arrived, weight)
+    u1, u2 = transport.draw(index)
     turned = cosine_direction(shading, u1, u2)
     paths.alive[index] &= np.einsum("ij,ij->j", turned, facing) > 0
     paths.direction[:, index] = turned
@@ -66,8 +58,9 @@ def _lambert(shading: Float32, facing: Float32, direction: Float32) -> Float32:
     return np.where(above, cosine * np.float32(1 / np.pi), 0)
 
 
-def meet_mirror(scene: TracedScene, paths: Paths, index: Indices, triangle: NDArray[np.int32]) -> None:
+def meet_mirror(transport: Transport, index: Indices, triangle: NDArray[np.int32]) -> None:
     """Reflect the paths ``index`` at a perfect mirror."""
+    scene, paths = transport.scene, transport.paths
     geometric = np.take(scene.triangle_normal, triangle, axis=1)
     direction, position = paths.direction[:, index], paths.origin[:, index]
     side = -np.copysign(np.float32(1), np.einsum("ij,ij->j", direction, geometric))
@@ -81,15 +74,15 @@ def meet_mirror(scene: TracedScene, paths: Paths, index: Indices, triangle: NDAr
     paths.density[index] = np.inf
 
 
-def patch_radiance(scene: TracedScene, position: Float32, facing: Float32, draw) -> Float32:
-    """(3, n) radiance of a white Lambertian patch at ``position`` that faces ``facing``, shadows left out.
+def patch_radiance(transport: Transport, index: Indices, facing: Float32) -> Float32:
+    """(3, n) radiance of white Lambertian patches where the paths ``index`` are, shadows left out; ``facing`` (3, n).
 
     Multiplied by the material's colour this is what a path returns that has left through a hole, or slipped
     through the surface: "infinitely long" inside, it would have taken on the material's colour (Wadkien 2008).
     """
-    u1, u2 = draw()
-    total = scene.lights.background(cosine_direction(facing, u1, u2))
-    for light in arriving(scene, position, draw):
+    u1, u2 = transport.draw(index)
+    total = transport.scene.lights.background(cosine_direction(facing, u1, u2))
+    for light in arriving(transport, index, transport.paths.origin[:, index]):
         cosine = np.maximum(np.einsum("ij,ij->j", facing, light.direction), 0)
         total += light.irradiance * (cosine / np.float32(np.pi))
     return total

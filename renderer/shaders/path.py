@@ -27,9 +27,8 @@ from ..tracing.acceleration import Acceleration
 from ..tracing.distance_grid import Scratch
 from ..tracing.paths import CHANCE, Paths
 from ..tracing.roulette import play_at_collisions
-from ..tracing.streams import Uniforms
-from ..tracing.tally import Tally
-from ..tracing.traced_scene import MISS, TracedScene
+from ..tracing.traced_scene import MISS
+from ..tracing.transport import Transport
 from .lost_paths import lose
 from .point_light import light_collisions
 from .refracted_light import light_through_facets
@@ -45,22 +44,15 @@ Float32 = NDArray[np.float32]
 
 
 class MediumWalk:
-    """One worker's paths inside one object's medium, up to ``capacity`` of them.
+    """One worker's paths inside the medium of the object ``slot``.
 
     Those that ``flies_on`` marks have a direction already; the others stand at a collision and are to be scattered.
     """
 
-    def __init__(
-        self,
-        scene: TracedScene,
-        slot: int,
-        capacity: int,
-        uniforms: Uniforms,
-        tally: Tally,
-        acceleration: Acceleration,
-    ):
-        self.scene, self.slot, self.tally = scene, slot, tally
-        self.paths = Paths(capacity, scene.media.count)
+    def __init__(self, transport: Transport, slot: int, acceleration: Acceleration):
+        self.transport, self.slot = transport, slot
+        self.paths, self._uniforms, self._tally = transport.paths, transport.uniforms, transport.tally
+        scene, capacity = transport.scene, transport.paths.capacity
         self._guide, self._jumps, self._grid = acceleration.guides[slot], acceleration.jumps[slot], acceleration.grid
         media = scene.media
         self._sigma_t, self._sigma_s = media.sigma_t[:, slot, None], media.sigma_s[:, slot, None]
@@ -72,16 +64,15 @@ class MediumWalk:
         # rounded positions on a flat side of the box are not outside
         self._centre = (thing.lower + thing.upper) / 2
         self._half = (thing.upper - thing.lower) / 2 + RAY_OFFSET
-        self._uniforms = uniforms
         self._flight, self._bound = np.empty((2, capacity), np.float32)
         self._turned = np.empty((3, capacity), np.float32)
         self._scratch = Scratch(capacity)
         self._jumps_from = np.float32(self._jumps.pays_from() if self._jumps else np.inf)
 
-    def step(self, standing: Paths, radiance: Float32) -> None:
+    def step(self, standing: Paths) -> None:
         """Scatter the paths and take them to their next collision; those that meet a surface go to ``standing``."""
         paths = self.paths
-        self._end_or_light(radiance)
+        self._end_or_light()
         bound = self._reach(paths.origin)
         if self._jumps is not None and bound is not None:
             self._jump(bound)
@@ -113,19 +104,17 @@ class MediumWalk:
         paths.flies_on[:] = False
         paths.surfaces[:] = 0
         paths.branch[:] = CHANCE
-        self._lose_leaked(radiance)
+        self._lose_leaked()
 
-    def _end_or_light(self, radiance: Float32) -> None:
+    def _end_or_light(self) -> None:
         """At the collisions: next-event estimation, then roulette."""
         paths = self.paths
         collided = ~paths.flies_on
-        self.tally.collisions += int(np.count_nonzero(collided))
+        self._tally.collisions += int(np.count_nonzero(collided))
         if self._lit.inside:
-            index = collided.nonzero()[0]
-            light_collisions(self.scene, paths, index, self.slot, self._density, self._uniforms, self.tally, radiance)
+            light_collisions(self.transport, collided.nonzero()[0], self.slot, self._density)
         if self._lit.facets:
-            index = collided.nonzero()[0]
-            light_through_facets(self.scene, paths, index, self.slot, self._uniforms, self.tally, radiance)
+            light_through_facets(self.transport, collided.nonzero()[0], self.slot)
         play_at_collisions(paths, self._uniforms)
         paths.bury()
 
@@ -213,8 +202,8 @@ class MediumWalk:
         else:
             near = (flight >= bound).nonzero()[0]
             origin, direction, limit = paths.origin[:, near], paths.direction[:, near], flight[near]
-        distance, triangle = self.scene.met(origin, direction, limit + _BEYOND)
-        self.tally.rays += len(limit)
+        distance, triangle = self.transport.scene.met(origin, direction, limit + _BEYOND)
+        self._tally.rays += len(limit)
         hit = (triangle != -1).nonzero()[0]
         beyond = distance[hit] > limit[hit]
         arrived, just_before = hit[~beyond], hit[beyond]
@@ -235,14 +224,14 @@ class MediumWalk:
         """Draw the paths ``index``, which collide ``gap`` (m,) before ``triangle``, back to where rounding cannot take
         them through it: a quarter of a millionth of the scene."""
         faces = (triangle >= 0).nonzero()[0]
-        index, normal = index[faces], np.take(self.scene.triangle_normal, triangle[faces], axis=1)
+        index, normal = index[faces], np.take(self.transport.scene.triangle_normal, triangle[faces], axis=1)
         cosine = np.einsum("ij,ij->j", self.paths.direction[:, index], normal)
         height = gap[faces] * np.abs(cosine)
         low = (height < _CLEAR).nonzero()[0]
         back = np.copysign(_CLEAR - height[low], -cosine[low])
         self.paths.origin[:, index[low]] += normal[:, low] * back
 
-    def _lose_leaked(self, radiance: Float32) -> None:
+    def _lose_leaked(self) -> None:
         """End paths that collide outside their object's bounding box: they have slipped through its surface."""
         paths = self.paths
         off = np.subtract(paths.origin, self._centre, out=self._turned[:, : paths.count])
@@ -251,5 +240,5 @@ class MediumWalk:
         lost = np.flatnonzero(~(off <= self._half).all(axis=0))
         if len(lost):
             paths.origin[:, lost] = np.clip(np.nan_to_num(paths.origin[:, lost]), -1, 1)
-            lose(self.scene, paths, lost, self.slot, self._uniforms, self.tally, radiance)
+            lose(self.transport, lost, self.slot)
             paths.remove(lost)

@@ -19,9 +19,7 @@ from ..optics.phase import henyey_greenstein
 from ..tracing.paths import REFLECTS, REFRACTS, Paths
 from ..tracing.shadow import FREE_DEPTH
 from ..tracing.shadow import transmittance as shadow_transmittance
-from ..tracing.streams import Uniforms
-from ..tracing.tally import Tally
-from ..tracing.traced_scene import TracedScene
+from ..tracing.transport import Transport
 from .crossings import Crossings
 from .direct_light import arriving, pick, received, worthwhile
 from .local_frame import LocalFrame
@@ -30,14 +28,10 @@ Float32 = NDArray[np.float32]
 
 
 def light_collisions(
-    scene: TracedScene,
-    paths: Paths,
+    transport: Transport,
     index: NDArray[np.intp],
     slot: int,
     drawn: Callable[[NDArray[np.intp], Float32], Float32],
-    uniforms: Uniforms,
-    tally: Tally,
-    radiance: Float32,
 ) -> None:
     """Light the collisions of the paths ``index`` in the medium ``slot``, from where light comes straight on.
 
@@ -50,45 +44,37 @@ def light_collisions(
     """
     if not len(index):
         return
+    scene, paths = transport.scene, transport.paths
     media = scene.media
     position = paths.origin[:, index]
     ior = float(media.ior[slot])
     if ior == 1:
-        lights = arriving(scene, position, lambda: uniforms.draw_at(paths.stream, index), skies=True)
+        lights = arriving(transport, index, position, skies=True)
     else:
         held = zip(scene.lights.points, scene.holds_light[:, slot], strict=True)
         lights = (source.illuminate(position) for source, holds in held if holds)
     for light in lights:
         phase = henyey_greenstein(np.einsum("ij,ij->j", paths.direction[:, index], light.direction), media.g[slot])
-        some, weight = worthwhile(paths, index, light, phase, drawn(index, light.direction), uniforms)
+        some, weight = worthwhile(transport, index, light, phase, drawn(index, light.direction))
         if not len(some):
             continue
         who, light = index[some], pick(light, some)
-        u, _ = uniforms.draw_at(paths.stream, who)
+        u, _ = transport.draw(who)
         deepest = FREE_DEPTH + exponential(u, np.empty_like(u))
         visible = shadow_transmittance(
-            scene, position[:, some], light, paths.inside[:, who], paths.owner[who], tally, deepest
+            scene, position[:, some], light, paths.inside[:, who], paths.owner[who], transport.tally, deepest
         )
-        arrived = light.irradiance * (weight * visible / (ior * ior))
-        radiance[:, paths.sample[who]] += paths.throughput[:, who] * arrived
+        transport.add(who, light.irradiance * (weight * visible / (ior * ior)))
 
 
-def light_rough(
-    scene: TracedScene,
-    paths: Paths,
-    at: Crossings,
-    frame: LocalFrame,
-    view: Float32,
-    uniforms: Uniforms,
-    tally: Tally,
-    radiance: Float32,
-) -> None:
+def light_rough(transport: Transport, at: Crossings, frame: LocalFrame, view: Float32) -> None:
     """Light rough boundary points by reflection or transmission, whichever side the light is on.
 
     frame, view  axes around the shading normal on the viewer's side, and the direction back along the path in them
     """
+    scene, paths = transport.scene, transport.paths
     alpha = scene.translucent[int(at.slot[0])].roughness
-    for light in arriving(scene, at.position, lambda: uniforms.draw_at(paths.stream, at.index), skies=True):
+    for light in arriving(transport, at.index, at.position, skies=True):
         to_light = frame.to_local(light.direction)
         drawn, share = turned_density(paths, at, view, to_light, alpha)
         value = drawn * share * unmasked(to_light[2], alpha)
@@ -97,15 +83,15 @@ def light_rough(
         owner = np.where(same_side, at.before, at.beyond)
         # straight rays lead to the light from where the index is 1; shading and true normal must agree on the side
         value[(scene.media.ior[owner] != 1) | (height * to_light[2] <= 0)] = 0
-        useful, weight = worthwhile(paths, at.index, light, value, drawn, uniforms)
+        useful, weight = worthwhile(transport, at.index, light, value, drawn)
         if len(useful):
             some = at.take(useful)
             side = np.where(same_side[useful], np.float32(1), np.float32(-1))
             inside = np.where(same_side[useful], some.inside_before, some.inside_beyond)
             arrived = received(
-                scene, some.position, some.near_normal * side, pick(light, useful), inside, owner[useful], tally
+                transport, some.position, some.near_normal * side, pick(light, useful), inside, owner[useful]
             )
-            radiance[:, paths.sample[some.index]] += paths.throughput[:, some.index] * arrived * weight
+            transport.add(some.index, arrived, weight)
 
 
 def turned_density(

@@ -14,12 +14,10 @@ from numpy.typing import NDArray
 
 from ..optics.phase import henyey_greenstein
 from ..scene.lights import DirectionalSource, Illumination
-from ..tracing.paths import Paths
 from ..tracing.refracted_beams import FAR_CHANCE, Arrivals, RefractedBeams
 from ..tracing.shadow import cross, follow, transmittance
-from ..tracing.streams import Uniforms
-from ..tracing.tally import Tally
-from ..tracing.traced_scene import TracedScene, offset_from
+from ..tracing.traced_scene import offset_from
+from ..tracing.transport import Transport
 
 Float32 = NDArray[np.float32]
 _FAINT = np.float32(0.1)
@@ -29,43 +27,35 @@ _MIRRORED_CHANCE = 0.25
 """Probability with which a collision asks for light mirrored inside: what it adds is small, finding it is not cheap."""
 
 
-def light_through_facets(
-    scene: TracedScene,
-    paths: Paths,
-    index: NDArray[np.intp],
-    slot: int,
-    uniforms: Uniforms,
-    tally: Tally,
-    radiance: Float32,
-) -> None:
+def light_through_facets(transport: Transport, index: NDArray[np.intp], slot: int) -> None:
     """Light the collisions of the paths ``index`` in the medium ``slot`` through smooth boundaries of its index.
 
     ``paths.direction`` must still be the one before the collision.
     """
     if not len(index):
         return
-    position = paths.origin[:, index]
-    for beams in scene.beams:
-        if np.float32(beams.ior) != scene.media.ior[slot]:
+    position = transport.paths.origin[:, index]
+    for beams in transport.scene.beams:
+        if np.float32(beams.ior) != transport.scene.media.ior[slot]:
             continue
-        choice, play = uniforms.draw_at(paths.stream, index)
-        _add(scene, paths, index, slot, beams, beams.near_arrivals(position), 1.0, play, tally, radiance)
+        choice, play = transport.draw(index)
+        _add(transport, index, slot, beams, beams.near_arrivals(position), 1.0, play)
         far = np.flatnonzero(choice < FAR_CHANCE)
         if len(far) and not beams.all_near:
             found = beams.far_arrivals(position[:, far])
-            _add(scene, paths, index[far], slot, beams, found, 1 / FAR_CHANCE, play[far], tally, radiance)
+            _add(transport, index[far], slot, beams, found, 1 / FAR_CHANCE, play[far])
         some = np.flatnonzero(choice >= 1 - _MIRRORED_CHANCE)
         for generation in range(1, len(beams.generations)) if len(some) else ():
             found = beams.near_arrivals(position[:, some], generation)
-            _add(scene, paths, index[some], slot, beams, found, 1 / _MIRRORED_CHANCE, play[some], tally, radiance)
+            _add(transport, index[some], slot, beams, found, 1 / _MIRRORED_CHANCE, play[some])
 
 
 def _add(
-    scene: TracedScene, paths: Paths, index: NDArray[np.intp], slot: int, beams: RefractedBeams, found: Arrivals,
-    times: float, play: Float32, tally: Tally, radiance: Float32,
+    transport: Transport, index: NDArray[np.intp], slot: int, beams: RefractedBeams, found: Arrivals, times: float,
+    play: Float32,
 ) -> None:  # fmt: skip
     """Add what ``found`` brings to the paths ``index``, ``times`` over; ``play`` (n,) uniforms for roulette."""
-    media = scene.media
+    paths, media = transport.paths, transport.scene.media
     path = index[found.point]
     depth = media.sigma_t[:, slot, None] * found.length.astype(np.float32)
     share = (times * found.share).astype(np.float32)
@@ -78,19 +68,19 @@ def _add(
     direction = [one.astype(np.float32) for one in found.direction]
     mu = -np.einsum("ij,ij->j", paths.direction[:, path], direction[0])
     phase = henyey_greenstein(mu, media.g[slot])
-    arriving = _follow(scene, paths, path, beams, found, direction, tally)
+    arriving = _follow(transport, path, beams, found, direction)
     strength = beams.source.irradiance if isinstance(beams.source, DirectionalSource) else beams.source.intensity
     light = paths.throughput[:, path] * arriving * (strength * (phase * weight))
     sample, place = np.unique(paths.sample[path], return_inverse=True)
-    for row, values in zip(radiance, light, strict=True):
+    for row, values in zip(transport.radiance, light, strict=True):
         row[sample] += np.bincount(place, values).astype(np.float32)
 
 
 def _follow(
-    scene: TracedScene, paths: Paths, path: NDArray[np.intp], beams: RefractedBeams, found: Arrivals,
-    direction: list[Float32], tally: Tally,
-) -> Float32:  # fmt: skip
+    transport: Transport, path: NDArray[np.intp], beams: RefractedBeams, found: Arrivals, direction: list[Float32]
+) -> Float32:
     """(3, c) share of the light that comes through from outside, with attenuation and shadows."""
+    scene, paths, tally = transport.scene, transport.paths, transport.tally
     media, ior = scene.media, np.float32(beams.ior)
     result = np.zeros((3, len(path)), np.float32)
     left = np.arange(len(path))

@@ -218,12 +218,24 @@ class TracedScene:
     ) -> tuple[Float32, NDArray[np.int32]]:
         """As ``closest``, sphere lights included: triangle -2 - k is the k-th of them."""
         distance, triangle = self.closest(origin, direction, limit)
+        self._meet_spheres(origin, direction, distance, triangle)
+        return distance, triangle
+
+    def met_with_place(self, origin: Float32, direction: Float32):
+        """As ``RayCaster.closest_with_place``, sphere lights included."""
+        distance, triangle, u, v = self.caster.closest_with_place(origin, direction)
+        self._meet_spheres(origin, direction, distance, triangle)
+        return distance, triangle, u, v
+
+    def _meet_spheres(
+        self, origin: Float32, direction: Float32, distance: Float32, triangle: NDArray[np.int32]
+    ) -> None:
+        """Put sphere lights where they are nearer than what was met, in place."""
         for k, sphere in enumerate(self.lights.spheres):
             reach = sphere.distance(origin, direction)
             nearer = reach < distance
             np.copyto(distance, reach, where=nearer)
             np.copyto(triangle, np.int32(-2 - k), where=nearer)
-        return distance, triangle
 
     def on_plane(self, position: Float32, triangle: NDArray[np.int32]) -> Float32:
         """(3, n) hit points moved back onto their triangle's plane.

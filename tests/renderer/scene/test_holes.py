@@ -7,6 +7,7 @@ from renderer.scene.admission import admit
 from renderer.scene.holes import close_holes, expected_error, in_mesh_units
 from renderer.scene.transform import transformed
 from sss_tools import shapes
+from sss_tools.mesh import Mesh
 from sss_tools.sealing import Loop
 from tests.renderer.scenes import WHITE_SKY, camera, diffuse, placed, scene, translucent
 from tests.sss_tools.test_sealing import punctured, spiked
@@ -56,18 +57,25 @@ def test_the_thesis_rule_expects_a_larger_error():
 def test_where_no_cap_fits_the_thesis_rule_is_left_and_the_place_named():
     thing, report, before = closed(spiked())
     assert thing is before and report.handling == "terminate"
-    assert "1 of 1 caps would pass through the surface they close, around (" in report.reason
+    assert report.reason.startswith("because; but its cap would pass through the surface that it closes, around (")
     both = shapes.joined(spiked(), shapes.moved(punctured(20), (3, 0, 0)))
     thing, report, _ = closed(both)
     assert (report.handling, report.loops, report.capped) == ("cap", 2, 1)
+    assert "; but 1 of 2 caps would pass through the surface that it closes, around (" in report.reason
     assert thing.closedness.state == "holes"
+    neither = shapes.joined(spiked(), shapes.moved(spiked(), (3, 0, 0)))
+    _, report, _ = closed(neither)
+    assert (report.handling, report.loops, report.capped) == ("terminate", 2, 0)
+    assert "; but all 2 caps would pass through the surface that they close, around (" in report.reason
 
 
 @pytest.mark.parametrize("handling", ["cap", "terminate"])
 def test_bodies_inside_out_are_turned(handling):
     thing, report, _ = closed(shapes.inverted(BALL), handling)
     assert report.turned == len(BALL.faces) and thing.mesh.volume == pytest.approx(BALL.volume)
-    assert "faces turned outwards" in report.reason
+    assert report.reason == f"because; {report.turned} faces turned outwards"
+    _, report, _ = closed(Mesh(BALL.vertices, np.concatenate([BALL.faces[:1, ::-1], BALL.faces[1:]])), handling)
+    assert report.reason == "because; 1 face turned outwards"
 
 
 def test_expected_errors_are_those_of_the_table_on_a_ball_and_less_on_what_is_larger():
