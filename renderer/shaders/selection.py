@@ -331,9 +331,10 @@ def _handling(thing: SceneObject, wish: str) -> tuple[str, str]:
     if wish != "auto":
         return wish, "hole handling asked for"
     recorded, state = thing.closedness.hole_handling, thing.closedness.state
+    holes = len(thing.closedness.holes)
     because = {
         "strict": "closed, manifold and oriented",
-        "cap": f"{len(thing.closedness.holes)} hole(s), closed for light by caps",
+        "cap": f"{holes} {'hole' if holes == 1 else 'holes'} to close for light by caps",
         "terminate": f"state {state} with flaws: paths that contradict the surface take the material's colour",
         "surface": "open",
     }

@@ -298,7 +298,7 @@ def test_ctrl_c_leaves_a_picture_of_whole_passes_and_status_130(workplace, start
             shapes.punctured(shapes.icosphere(1.0, 3), [[0, 1, 0]], 0.2),
             "holes",
             "cap",
-            "1 hole(s), closed for light by caps",
+            "1 hole to close for light by caps",
         ),
         (shapes.with_internal(shapes.icosphere(1.0, 2), (0, 0, 0), 0.4, 1), "closed", "terminate", "with flaws"),
         (shapes.punctured(shapes.icosphere(1.0, 3), [[0, 1, 0]], 1.85), "open", "surface", "encloses no volume"),
