@@ -1,6 +1,7 @@
 """How many passes are enough? The first ones of the picture itself tell how noisy path is, better than any prediction.
 
-A picture whose passes the quality decides goes on in rounds, each at most twice as long as all before. After each round
+A picture whose passes the quality decides goes on in rounds, each at most three times as long as all before: at the end
+of each the last paths walk alone, and the fewer rounds the better. After each round
 the noise of a camera sample is measured over every object, and the picture is done when it has as many passes as its
 most demanding object needs for its noise to be within its tolerance: surely so, at the upper end of what was measured.
 What is decided depends on the samples alone, so it is the same for any threads. Stopping by the noise that was seen
@@ -24,6 +25,8 @@ FIRST = 4
 SURE = 2.5
 """Standard errors between the square of a measured noise and its bound: with half as many, 1 in 7 pictures would stop
 too soon (``benchmarks/prediction.py``)."""
+GROWTH = 4
+"""Passes after a round are at most so many times those before."""
 FEW_PIXELS = 8
 
 
@@ -50,7 +53,7 @@ def rounds(renderer: Renderer, planned: int) -> Iterator[tuple[int, int]]:
 
 def next_round(done: int, needed: int) -> int:
     """How many passes there are after the next round; ``done`` where there is none."""
-    return max(done, min(needed, max(2 * done, FIRST)))
+    return max(done, min(needed, max(GROWTH * done, FIRST)))
 
 
 def is_by_path(plan: Plan) -> bool:

@@ -32,9 +32,9 @@ def noisy_film(noise, passes=64, side=40, seed=3):
     return film
 
 
-def test_rounds_double_until_there_are_enough():
+def test_rounds_grow_fourfold_until_there_are_enough():
     assert next_round(0, 100) == FIRST and next_round(0, 2) == 2
-    assert next_round(8, 100) == 16 and next_round(8, 11) == 11
+    assert next_round(8, 100) == 32 and next_round(8, 11) == 11
     assert next_round(8, 8) == next_round(8, 3) == 8
 
 
