@@ -2,7 +2,7 @@
 
     python examples/three_distances.py [FOLDER]
 
-The same as ``sss-render examples/three_distances.toml --quality 0``, with the reasons under the picture. The
+The same as ``sss-render examples/three_distances.toml --quality 0.05``, with the reasons under the picture. The
 meshes go into out/, where the scene file looks for them.
 """
 
@@ -24,9 +24,9 @@ def main() -> None:
     meshes.mkdir(exist_ok=True)
     make(meshes, ["elephant", "ground"])
     scene = load_scene(HERE / "three_distances.toml")
-    renderer = Renderer(scene, Settings(quality=0), PASSES)
+    renderer = Renderer(scene, Settings(quality=0.05), PASSES)
     renderer.run(range(PASSES))
-    caption = "shader auto, quality 0"
+    caption = "shader auto, quality 0.05"
     for plan in renderer.plans[:3]:
         reason = plan.reason.split(";")[0]
         caption += f"\n{plan.name}, {plan.distance:.1f} m away, {plan.size_px:.0f} pixels: {plan.shader} - {reason}"

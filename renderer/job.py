@@ -105,7 +105,7 @@ def execute(
         image.check_writable(preview)
         if preview.resolve() in (output.resolve(), checkpoint.resolve()):
             raise InputError(preview, "is a file of the render itself", "give --preview another name")
-        kept.append(_Refreshed(preview))
+        kept.insert(0, _Refreshed(preview))  # what somebody waits for comes first
     if resume:
         renderer.film = _resumed(renderer.film, output, checkpoint)
     error = float("nan")

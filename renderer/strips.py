@@ -28,7 +28,7 @@ _LONG = 1.5
 """Times that paths in flight have still to go as far as the mean path, to be on the safe side."""
 _LONGEST, _STEP_SECONDS = 2.0, 5e-4
 """Times that the longest path to come is longer than all before, and what a step takes when few paths are left."""
-_PATIENCE, _PATIENT_SHARE = 1.0, 0.5
+_PATIENCE, _PATIENT_SHARE = 0.25, 0.5
 """Seconds, and share of the run so far, that the oldest path may take before fewer keep it company."""
 _MOST_UNDER_WAY = 2**22
 """Camera samples begun and not yet in the film, at most: 14 bytes each."""

@@ -48,7 +48,7 @@ def test_three_distances_are_three_shaders(example, tmp_path):
     scene_file = shutil.copy(EXAMPLES / "three_distances.toml", tmp_path / "examples")
     example("make_meshes").make(tmp_path / "out", ["elephant", "ground"])
     scene, _ = admit(load_scene(scene_file))
-    assert [plan.shader for plan in select(scene, 0)] == ["path", "plumb", "scalar", "opaque"]
+    assert [plan.shader for plan in select(scene, 0.05)] == ["path", "plumb", "scalar", "opaque"]
 
 
 @pytest.mark.parametrize("trouble", [OSError("no network"), ValueError("another hash")], ids=["offline", "hash"])

@@ -124,7 +124,7 @@ def test_few_paths_are_in_flight_at_first_and_where_one_takes_long(monkeypatch):
     of = Strips(range(100), np.arange(100), 2, 100)
     most = 10**5
     assert of.room(most, 0, 0) == of.room(most, 1000, 0) == strips._FIRST_ROOM // 2
-    assert of.room(most, 10**4, 0.5) == 10**4 and of.room(most, 10**6, 0.5) == most
+    assert of.room(most, 10**4, 0.2) == 10**4 and of.room(most, 10**6, 0.2) == most
     assert of.room(most, 10**6, 4) == strips._FIRST_ROOM // 2
     clock.now += 4
     assert strips._FIRST_ROOM // 2 < of.room(most, 10**6, 4) < most / 5
