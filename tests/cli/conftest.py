@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import os
+import signal
 import subprocess
 import sys
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -45,7 +47,12 @@ def workplace(tmp_path, monkeypatch) -> Path:
 
 
 def interpreter(code: str, *arguments: str, **options) -> subprocess.Popen:
-    """Code in a fresh interpreter that finds what this one finds; its output is text, in pipes."""
+    """Code in a fresh interpreter that finds what this one finds; its output is text, in pipes.
+
+    A shell that runs the tests in the background has them ignore SIGINT, and what they start would inherit that.
+    """
+    if sys.platform != "win32":
+        options.setdefault("preexec_fn", partial(signal.signal, signal.SIGINT, signal.SIG_DFL))
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(path or str(Path.cwd()) for path in sys.path)}
     return subprocess.Popen(
         [sys.executable, "-c", code, *arguments],
