@@ -26,7 +26,7 @@ from renderer.optics.guided_flight import Guide
 from renderer.scene.camera import CameraRays
 from renderer.scene.description import Translucent
 from renderer.scene.staging import stage_mesh
-from renderer.strips import Assembly, Strips
+from renderer.strips import WholePass, traced_passes
 from renderer.tracing.acceleration import Acceleration
 from renderer.tracing.distance_grid import DistanceGrid
 from renderer.tracing.memory import keep_freed_memory
@@ -103,14 +103,9 @@ def measure(mesh, albedo: float, mean_free_path: float, passes: int) -> dict:
             "tables_seconds": tables_seconds, "chosen": describe(chosen), "ways": rows}  # fmt: skip
 
 
-def passes_of(tracer: Wavefront, passes: range) -> tuple[list[tuple], Tally]:
-    """Some passes as ``Assembly`` gives them, and what was counted."""
-    pixels = np.arange(SIZE[0] * SIZE[1])
-    assembly, tally, done = Assembly(len(pixels)), Tally(), []
-    for strip in tracer.trace(Strips(passes, pixels, 1, 2**13)):
-        tally.add(strip.tally)
-        done += assembly.add(strip)
-    return done, tally
+def passes_of(tracer: Wavefront, passes: range) -> tuple[list[WholePass], Tally]:
+    """Of the whole picture."""
+    return traced_passes(tracer, passes, np.arange(SIZE[0] * SIZE[1]), 2**13)
 
 
 def way_measured(traced: TracedScene, camera: CameraRays, way: Acceleration, passes: int) -> dict:

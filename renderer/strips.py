@@ -11,6 +11,7 @@ import threading
 import time
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -86,7 +87,7 @@ class Strips:
         self.longest = min(longest, max(len(pixels), 1))
         self._passes, self._pixels, self._tracers, self._seconds_left = iter(passes), pixels, tracers, seconds_left
         self._turn, self._pass_index, self._first = -1, 0, len(pixels)
-        self._ended = self._longest = self._added = 0
+        self._ended = self._most_steps = self._added = 0
         self._started = time.monotonic()
         self._changed = threading.Condition()
         self.stopped = self.over = self.exhausted = False
@@ -105,7 +106,7 @@ class Strips:
         """So many more paths have ended, and some have gone so many steps."""
         with self._changed:
             self._ended += ended
-            self._longest = max(self._longest, steps)
+            self._most_steps = max(self._most_steps, steps)
 
     def take(self) -> Strip | None:
         """The next; None where there is none now, or, where it is ``over``, none any more."""
@@ -139,7 +140,7 @@ class Strips:
         in_flight = begun - self._ended
         # those in flight are half done, in the mean
         rate = max(begun - in_flight / 2, 1) / max(time.monotonic() - self._started, 1e-6)
-        return (len(self._pixels) + _LONG * in_flight) / rate + _LONGEST * self._longest * _STEP_SECONDS
+        return (len(self._pixels) + _LONG * in_flight) / rate + _LONGEST * self._most_steps * _STEP_SECONDS
 
     def note_added(self) -> None:
         """A pass is in the film."""
@@ -159,6 +160,14 @@ class Strips:
             self._changed.notify_all()
 
 
+class WholePass(NamedTuple):
+    """Number of a pass, (n, 3) float32 radiance of its samples, (n,) int16 objects that they met first."""
+
+    number: int
+    radiance: Float32
+    first_object: NDArray[np.int16]
+
+
 class Assembly:
     """Passes of ``pixels`` pixels under way."""
 
@@ -167,8 +176,8 @@ class Assembly:
         self._passes: dict[int, list[TracedStrip]] = {}
         self._missing: dict[int, int] = {}
 
-    def add(self, traced: TracedStrip) -> Iterator[tuple[int, Float32, NDArray[np.int16]]]:
-        """Passes that are now whole, as are all before them: number, (n, 3) radiance, (n,) first object."""
+    def add(self, traced: TracedStrip) -> Iterator[WholePass]:
+        """Passes that are now whole, as are all before them."""
         turn = traced.strip.turn
         self._passes.setdefault(turn, []).append(traced)
         self._missing[turn] = self._missing.get(turn, self._pixels) - len(traced.strip.pixels)
@@ -181,13 +190,32 @@ class Assembly:
         """Whether there are passes that wait only for others."""
         return 0 in self._missing.values()
 
-    def rest(self) -> Iterator[tuple[int, Float32, NDArray[np.int16]]]:
+    def rest(self) -> Iterator[WholePass]:
         """As ``add``, the other whole passes, although some before them are not."""
         for turn in sorted(turn for turn, missing in self._missing.items() if missing == 0):
             yield self._whole(turn)
 
-    def _whole(self, turn: int) -> tuple[int, Float32, NDArray[np.int16]]:
+    def _whole(self, turn: int) -> WholePass:
         del self._missing[turn]
         parts = sorted(self._passes.pop(turn), key=lambda part: part.strip.first)
         radiance = np.concatenate([part.radiance.T for part in parts])
-        return parts[0].strip.pass_index, radiance, np.concatenate([part.first_object for part in parts])
+        return WholePass(parts[0].strip.pass_index, radiance, np.concatenate([part.first_object for part in parts]))
+
+
+class Tracer(Protocol):
+    """What traces strips."""
+
+    def trace(self, strips: Strips) -> Iterator[TracedStrip]:
+        """Until there are no more, or they are stopped."""
+
+
+def traced_passes(
+    tracer: Tracer, passes: range, pixels: NDArray[np.int64], longest: int
+) -> tuple[list[WholePass], Tally]:
+    """Whole passes by one tracer alone, in strips of at most ``longest`` pixels, and what it counted."""
+    assembly, tally = Assembly(len(pixels)), Tally()
+    done: list[WholePass] = []
+    for strip in tracer.trace(Strips(passes, pixels, 1, longest)):
+        tally.add(strip.tally)
+        done += assembly.add(strip)
+    return done, tally

@@ -95,13 +95,14 @@ class Wavefront:
             outside, inside = self._flying.count + self._standing.count, sum(walk.paths.count for walk in self._walks)
             taken = branches * outside + inside
             steps, age = self._columns.oldest(self._steps)
-            room = max(strips.room(self._flying.capacity, self._emitted - outside - inside, age), branches)
+            ended = self._emitted - outside - inside
+            room = max(strips.room(self._flying.capacity, ended, age), branches)
             if taken <= room * _REFILL_AT:
                 yield from self._ended()
-                ended, self._noted = self._emitted - outside - inside - self._noted, self._emitted - outside - inside
-                strips.note(ended, steps)
+                strips.note(ended - self._noted, steps)
+                self._noted = ended
                 self._emit(strips, (room - taken) // branches)
-            if inside or self._flying.count or self._standing.count:
+            if any(place.paths.count for place in self._places):
                 self._step()
             elif strips.over and self._columns.emitting is None:
                 yield from self._ended()

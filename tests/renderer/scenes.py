@@ -19,7 +19,7 @@ from renderer.scene.description import (
     SceneObject,
     Translucent,
 )
-from renderer.strips import Assembly, Strips
+from renderer.strips import traced_passes
 from renderer.tracing.tally import Tally
 from renderer.tracing.traced_scene import TracedScene
 from renderer.wavefront import BLOCK, Wavefront
@@ -115,11 +115,9 @@ class Samples:
 def traced(tracer, pixels, first_pass: int = 0, passes: int = 1, longest: int = 2**13) -> Samples:
     """All samples of ``pixels``, a number of them or (n,) which, in some passes."""
     pixels = np.arange(pixels) if isinstance(pixels, int) else pixels
-    assembly, tally, done = Assembly(len(pixels)), Tally(), []
-    for strip in tracer.trace(Strips(range(first_pass, first_pass + passes), pixels, 1, longest)):
-        tally.add(strip.tally)
-        done += assembly.add(strip)
-    assert [index for index, _, _ in done] == list(range(first_pass, first_pass + passes))
+    numbers = range(first_pass, first_pass + passes)
+    done, tally = traced_passes(tracer, numbers, pixels, longest)
+    assert [index for index, _, _ in done] == list(numbers)
     radiance, first_object = np.stack([each.T for _, each, _ in done]), np.stack([first for _, _, first in done])
     return Samples(radiance, first_object, tally)
 
