@@ -62,11 +62,6 @@ def complain(program: str, message: str, kind: str = "error") -> None:
     sys.stderr.write(one_line(f"{program}: {kind}: {message}") + "\n")
 
 
-def unavailable(option: str, remedy: str = "leave it out") -> InputError:
-    """The error for an option or argument whose engine comes in a later version."""
-    return InputError(option, "not available in this version", remedy)
-
-
 def run(program: str, body: Callable[[Sequence[str] | None], int], argv: Sequence[str] | None = None) -> int:
     """Run a command and return its exit status.
 

@@ -62,7 +62,7 @@ class Result:
     tally    what happened on the way
     seconds  the worker took, without building the scene
     hash     of the scene as the worker plans to render it, see ``render.planned_hash``
-    machine  what last bits depend on, see ``_machine``
+    machine  what last bits depend on, see ``worker.machine``
     """
 
     passes: tuple[Pass, ...]
