@@ -32,16 +32,10 @@ ROOT = Path(__file__).parents[1]
 TASK_BYTES = 300
 """Of a path of a hundred characters and its task, and a place in two lists, as tracemalloc counts them."""
 COMMAND = """
-import resource, sys
-from pathlib import Path
+import sys
 from cli.sss_check import main
-status = main(sys.argv[1:])
-peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * (1 if sys.platform == "darwin" else 1024)
-if Path("/proc/self/status").exists():
-    # on Linux ru_maxrss begins with what the process was before it became this program
-    lines = Path("/proc/self/status").read_text().splitlines()
-    peak = next(int(line.split()[1]) * 1024 for line in lines if line.startswith("VmHWM"))
-print(status, peak)
+from sss_tools.memory import peak_memory
+print(main(sys.argv[1:]), peak_memory())
 """
 
 

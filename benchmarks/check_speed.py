@@ -12,7 +12,6 @@ import argparse
 import json
 import os
 import platform
-import resource
 import subprocess
 import sys
 import tempfile
@@ -25,6 +24,7 @@ import numpy as np
 from sss_tools import shapes
 from sss_tools.loading import load_mesh
 from sss_tools.medium import Medium
+from sss_tools.memory import peak_memory
 from sss_tools.mesh import Mesh
 from sss_tools.writing import write_mesh
 
@@ -125,14 +125,10 @@ def measure(path: Path) -> dict:
     for number in (0, 1):
         seconds["all rules"][number] += seconds["topology"][number]
         seconds[FAMILIES["1"]][number] -= seconds["verdict on closedness, with SSS302"][number]
-    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
-    if Path("/proc/self/status").exists():
-        lines = Path("/proc/self/status").read_text().splitlines()
-        peak = next(int(line.split()[1]) / 1024 for line in lines if line.startswith("VmHWM"))
     return {
         "faces": len(mesh.faces),
         "seconds": seconds,
-        "peak_mb": peak,
+        "peak_mb": (peak_memory() or 0) / 2**20,
         "not_run": [rule.code for rule in report.rules if rule.outcome.value == "not-run"],
     }
 

@@ -24,7 +24,6 @@ from pathlib import Path
 
 import numpy as np
 
-from renderer.job import peak_memory
 from renderer.output.film import Film
 from renderer.render import Renderer, Settings
 from renderer.scene.description import Scene, Translucent
@@ -32,6 +31,7 @@ from renderer.scene.staging import stage_mesh
 from sss_tools.elephant import elephant
 from sss_tools.loading import load_mesh
 from sss_tools.medium import Medium
+from sss_tools.memory import peak_memory
 from sss_tools.mesh import Mesh
 
 SIZE = (500, 500)

@@ -13,8 +13,6 @@ Set-up is all from the start of the process to the first sample: imports, loadin
 from __future__ import annotations
 
 import argparse
-import resource
-import sys
 import time
 from itertools import count
 from pathlib import Path
@@ -22,6 +20,7 @@ from pathlib import Path
 import numpy as np
 
 from cli.clock import process_start
+from sss_tools.memory import peak_memory
 
 LANES = (2**15, 2**20)
 """Samples of one call of Mitsuba: enough to keep wide kernels busy, not more than fit in memory."""
@@ -42,15 +41,7 @@ def main() -> None:
     parser.add_argument("--rr-depth", type=int, default=1000)
     options = parser.parse_args()
     measured = ours(options) if options.renderer == "ours" else mitsuba(options)
-    np.savez(options.output, memory=_peak_memory(), **measured)
-
-
-def _peak_memory() -> int:
-    """Bytes. Linux's VmHWM (proc(5)) is this program's own; getrusage remembers the parent that it was forked from."""
-    status = Path("/proc/self/status")
-    if status.is_file():
-        return 1024 * next(int(line.split()[1]) for line in status.read_text().splitlines() if "VmHWM" in line)
-    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * (1 if sys.platform == "darwin" else 1024)
+    np.savez(options.output, memory=peak_memory(), **measured)
 
 
 def ours(options: argparse.Namespace) -> dict:

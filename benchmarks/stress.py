@@ -31,7 +31,6 @@ from pathlib import Path
 
 import numpy as np
 from first_figures import machine
-from one_render import _peak_memory as peak_memory
 from scipy import stats
 
 from renderer.render import Renderer, Settings
@@ -50,6 +49,7 @@ from renderer.study.judges import sidak
 from renderer.tracing.acceleration import Acceleration
 from sss_tools.errors import InputError
 from sss_tools.medium import Medium
+from sss_tools.memory import peak_memory
 from sss_tools.mesh import Mesh
 from sss_tools.shapes import box, cylinder, ellipsoid, icosphere, moved, torus
 

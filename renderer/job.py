@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sss_tools.errors import InputError
+from sss_tools.memory import peak_memory
 
 from . import adaptive, enough
 from .cluster.queue import ClusterLost
@@ -429,16 +430,6 @@ def _through_facets(renderer: Renderer, thing: SceneObject) -> tuple[str, str]:
     if sum(medium is not None and medium.ior != 1 and roughness == 0 for medium, roughness in media) > 1:
         bias += "; nor light that comes through another body with a smooth boundary"
     return method, bias
-
-
-def peak_memory() -> int | None:
-    """Greatest resident memory of this process so far, bytes; None where the system does not tell."""
-    try:
-        import resource
-    except ImportError:  # Windows
-        return None
-    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    return peak if sys.platform == "darwin" else 1024 * peak
 
 
 def guide_arrays(renderer: Renderer, names: list[str]) -> dict[str, NDArray]:

@@ -28,6 +28,23 @@ def share_of_memory(share: float) -> int | None:
     return None if memory is None else int(share * memory)
 
 
+def peak_memory() -> int | None:
+    """Greatest resident memory of this program so far, bytes; None where the system does not tell.
+
+    On Linux VmHWM of proc(5): the kernel's other count (getrusage) begins with what the process that started this
+    program held.
+    """
+    with contextlib.suppress(OSError):
+        lines = Path("/proc/self/status").read_text().splitlines()
+        return 1024 * next(int(line.split()[1]) for line in lines if line.startswith("VmHWM"))
+    if sys.platform == "win32":
+        return None
+    import resource
+
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    return peak if sys.platform == "darwin" else 1024 * peak
+
+
 @contextlib.contextmanager
 def limited_memory(limit: int | None) -> Iterator[None]:
     """Allocations beyond ``limit`` bytes of data fail as long as this lasts, where the platform can do that.

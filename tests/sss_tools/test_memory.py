@@ -1,5 +1,6 @@
 """How much memory may be used."""
 
+import subprocess
 import sys
 
 import numpy as np
@@ -38,3 +39,15 @@ def test_beyond_the_limit_allocations_fail_and_afterwards_they_do_not():
 
 def test_sizes_are_shown_with_their_unit():
     assert memory.shown_size(2**31) == "2 GiB" and memory.shown_size(500 * 2**20) == "500 MiB"
+
+
+@linux
+def test_the_greatest_memory_is_that_of_the_program_not_of_the_one_that_started_it():
+    """The parent held 300 MB; the kernel's other count goes on from there."""
+    child = "from sss_tools.memory import peak_memory; print(peak_memory())"
+    parent = (
+        "import os, subprocess, sys; held = bytearray(300_000_000);"
+        f"child = os.posix_spawn(sys.executable, [sys.executable, '-c', {child!r}], os.environ); os.waitpid(child, 0)"
+    )
+    done = subprocess.run([sys.executable, "-c", parent], capture_output=True, text=True, check=True)
+    assert 5e6 < int(done.stdout) < 150e6
