@@ -105,6 +105,7 @@ class Renderer:
         self.added = 0
         # their buffers outlive the threads of one ``run``
         self._idle: SimpleQueue[Wavefront | direct.DirectTracer] = SimpleQueue()
+        self._under_way: Strips | None = None
 
     def look_from(self, camera: Camera) -> None:
         """Begin a new film from another camera; whatever was built for the scene stays.
@@ -141,7 +142,7 @@ class Renderer:
         longest = _STRIP
         if self._frames is not None:
             longest = min(max(len(pixels) // (2 * threads) + 1, _STRIP), _FRAME_STRIP)
-        strips = Strips(passes, pixels, threads, longest, seconds_left)
+        strips = self._under_way = Strips(passes, pixels, threads, longest, seconds_left)
         assembly, results = Assembly(len(pixels)), SimpleQueue[TracedStrip | BaseException | None]()
         tracing = threads
         with self.stages.stage("render"), ThreadPoolExecutor(threads) as pool:
@@ -162,7 +163,7 @@ class Renderer:
                         strips.note_added()
                         if done is not None and done(index):
                             return False
-                return strips.exhausted
+                return strips.exhausted and not strips.stopped
             except Empty:
                 for index, radiance, first_object in assembly.rest():
                     self._add(index, radiance, first_object, chosen)
@@ -171,6 +172,11 @@ class Renderer:
                 return False
             finally:
                 strips.stop()
+
+    def stop(self) -> None:
+        """End a ``run`` of another thread now: passes under way are dropped, the film keeps those before."""
+        if self._under_way is not None:
+            self._under_way.stop()
 
     def _trace(self, strips: Strips, results: SimpleQueue[TracedStrip | BaseException | None]) -> None:
         """Trace strips until there are no more; ends with None, or with what went wrong."""

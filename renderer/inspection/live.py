@@ -91,14 +91,19 @@ class Live:
 
     def close(self) -> None:
         """End what is under way."""
-        self._stop.set()
+        self._end()
         if self._worker is not None:
             self._worker.join()
 
     def _move(self, camera: Camera) -> None:
-        self._stop.set()
+        self._end()
         with self._lock:
             self.camera, self._latest = camera, None
+
+    def _end(self) -> None:
+        """Drop what the reference is at, which would take the processors from the pictures of the movement."""
+        self._stop.set()
+        self._exact.stop()
 
     def _refine(self, camera: Camera) -> None:
         self._exact.look_from(camera)

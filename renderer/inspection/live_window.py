@@ -39,7 +39,7 @@ class LiveWindow:
         self._interactor: Any = cast(Any, vtkRenderWindowInteractor())
         self._interactor.SetRenderWindow(self.window)
         self._interactor.SetInteractorStyle(None)
-        self._show(live.moving())
+        self.show(live.moving())
         for event, act in (
             ("LeftButtonPressEvent", self._press), ("LeftButtonReleaseEvent", self._release),
             ("MouseMoveEvent", self._drag), ("MouseWheelForwardEvent", lambda *_: self._approach(0.9)),
@@ -83,20 +83,21 @@ class LiveWindow:
         if self._dirty:
             self._dirty = False
             begun = time.perf_counter()
-            self._show(self.live.moving())
+            self.show(self.live.moving())
             self.frames = [*self.frames[-29:], time.perf_counter() - begun]
             self._tell(f"moving, {1 / self.frames[-1]:.1f} pictures/s")
         elif time.monotonic() - self._moved > REST:
             best = self.live.resting()
             if best is not None and best[1] != self.told:
-                self._show(best[0])
+                self.show(best[0])
                 self._tell(best[1])
 
     def _tell(self, words: str) -> None:
         self.told = words
         self.window.SetWindowName(f"{self._title}: {words}")
 
-    def _show(self, image: NDArray[np.uint8]) -> None:
+    def show(self, image: NDArray[np.uint8]) -> None:
+        """Put (h, w, 3) sRGB into the window."""
         from vtkmodules.util.numpy_support import numpy_to_vtk
         from vtkmodules.vtkCommonDataModel import vtkImageData
 

@@ -77,6 +77,19 @@ def test_at_rest_passes_of_the_reference_add_up_and_say_their_error(live):
     assert image.shape == (64, 96, 3) and words.startswith("path, ") and "standard error" in words
 
 
+def test_a_movement_drops_the_pass_under_way():
+    """Of a body in which light is scattered so often that a pass takes seconds."""
+    dense = stage_mesh(shapes.icosphere(1.0, 2), Medium.from_albedo(0.9999, 50.0, g=0.5))
+    live = Live(dense, (320, 240))
+    live.resting()
+    worker = live._worker
+    while worker.is_alive() and live._exact._under_way is None:
+        time.sleep(0.01)
+    live.turn(0.1, 0.0)
+    worker.join(60)
+    assert not worker.is_alive() and live._exact.film.passes == 0
+
+
 def test_a_movement_ends_the_film_and_the_next_is_of_the_new_camera(live):
     wait_for_passes(live, 1)
     live.turn(0.7, 0.2)
