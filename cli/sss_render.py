@@ -17,14 +17,14 @@ from sss_tools.memory import limited_memory, share_of_memory
 
 from .clock import process_start
 from .command import ArgumentParser, complain, progress, run, version
+from .explanation import plan_at_length, plan_in_a_line
 
 if TYPE_CHECKING:
     from distributed import Client
 
     from renderer.job import Budget
     from renderer.render import Renderer, Settings
-    from renderer.scene.description import Scene, SceneObject
-    from renderer.scene.holes import HoleReport
+    from renderer.scene.description import Scene
     from renderer.shaders.selection import Measured, Plan
     from renderer.stages import Stages
 
@@ -105,7 +105,8 @@ def _rendered(options: Any, started: float, client: Client | None = None) -> int
     renderer = _renderer(client, scene, settings, passes, stages, measured)
     budget = _budget(options, started, renderer.plans)
     if not options.quiet:
-        _explain(renderer)
+        for thing, plan, hole in zip(renderer.scene.objects, renderer.plans, renderer.holes, strict=True):
+            print(plan_in_a_line(thing, plan, hole, renderer.sources.get(plan.name, "")))
     for plan in renderer.plans:
         if plan.warning:
             complain(PROGRAM, plan.warning, "warning")
@@ -178,8 +179,8 @@ def _parser() -> ArgumentParser:
     parser.add_argument("--max-memory", type=_memory, metavar="SIZE",
                         help="bytes to use at most: 500M, 2G (default: nine tenths of the machine's)")  # fmt: skip
     parser.add_argument("--size", type=_size, metavar="WxH", help="of the picture (default: the scene's, or 500x500)")
-    parser.add_argument("--material", metavar="NAME", help="preset for a bare mesh (default: marble's albedo at a "
-                        "mean free path of 2 %% of the size)")  # fmt: skip
+    parser.add_argument("--material", metavar="NAME|FILE", help="preset or TOML file for a bare mesh (default: "
+                        "marble's albedo at a mean free path of 2 %% of the size)")  # fmt: skip
     parser.add_argument("--unit", choices=("mm", "cm", "m", "inch"), default="mm",
                         help="what a unit of a bare mesh is, for --material (default: mm)")  # fmt: skip
     parser.add_argument("--hole-handling", choices=("auto", "strict", "cap", "terminate", "surface"), default="auto",
@@ -262,8 +263,11 @@ def _scene(options: Any) -> Scene:
     from renderer.scene.staging import stage_mesh
     from sss_tools.loading import load_mesh
 
+    from .materials import medium_of
+
+    medium = None if options.material is None else medium_of(options.material, options.unit)
     mesh = load_mesh(options.scene)
-    return stage_mesh(mesh, options.material, options.size or (500, 500), options.unit)
+    return stage_mesh(mesh, medium, options.size or (500, 500), options.unit)
 
 
 def _settings(options: Any) -> Settings:
@@ -336,59 +340,11 @@ def _explain_only(options: Any) -> int:
     passes = passes or picture_passes(plans)
     if not options.quiet:
         for thing, plan, hole in zip(scene.objects, plans, holes, strict=True):
-            _explain_at_length(thing, plan, hole, sources.get(plan.name, ""))
+            print(plan_at_length(thing, plan, hole, sources.get(plan.name, "")))
         print(f"{passes} passes" + (", or as many as the first ones tell" if _passes(options) is None else ""))
     if options.report is not None:
         _write_report(options.report, json.dumps(plan_report(scene, plans, holes, passes, version(), stages), indent=1))
     return 0
-
-
-def _explain_at_length(thing: SceneObject, plan: Plan, hole: HoleReport, source: str) -> None:
-    """An object's verdict and all shaders it could have had."""
-    if plan.state is None:
-        print(f"{plan.name}: {plan.shader}, {plan.size_px:.4g} pixels across at distance {plan.distance:.4g}")
-        return
-    assert thing.closedness is not None and plan.mean_free_path_px is not None
-    loops = thing.closedness.boundary_loops
-    print(
-        f"{plan.name}: {plan.state}, {loops} boundary loop(s) ({source}); "
-        f"hole handling {plan.hole_handling}{_expected(hole)}\n"
-        f"  distance {plan.distance:.4g}, {plan.size_px:.4g} pixels across, mean free path "
-        f"{plan.mean_free_path_px:.3g} pixels"
-    )
-    if plan.candidates:
-        print(f"  {'shader':8}{'error':>9}{'counted':>10}{'passes':>8}{'seconds':>10}{'share':>7}")
-    for one in plan.candidates:
-        share = plan.shares.get(one.shader, 0.0)
-        print(
-            f"  {one.shader:8}{_percentage(one.predicted_error):>9}{_percentage(one.error_bound):>10}{one.passes:>8}"
-            f"{one.predicted_seconds:>10.2g}{100 * share:>5.3g} %"
-        )
-    print(f"  {plan.shader}: {plan.reason}")
-
-
-def _explain(renderer: Renderer) -> None:
-    """Print the verdict on each object, what is done at holes, the shader and why."""
-    for thing, plan, hole in zip(renderer.scene.objects, renderer.plans, renderer.holes, strict=True):
-        if plan.state is None:
-            print(f"{plan.name}: {plan.shader}")
-            continue
-        closedness = thing.closedness
-        assert closedness is not None
-        holes = f", {closedness.boundary_loops} boundary loop(s)" if closedness.boundary_loops else ""
-        print(
-            f"{plan.name}: {plan.state}{holes} ({renderer.sources[plan.name]}); "
-            f"hole handling {plan.hole_handling}{_expected(hole)}; "
-            f"shader {plan.shader} at distance {plan.distance:.4g}: {plan.reason}"
-        )
-
-
-def _percentage(share: float) -> str:
-    return f"{100 * share:.0f} %" if share >= 0.1 else f"{100 * share:.2g} %"
-
-
-def _expected(hole: HoleReport) -> str:
-    return "" if not hole.expected_error else f", {100 * hole.expected_error:.2g} % error expected of it"
 
 
 def _check_report(path: Path) -> None:

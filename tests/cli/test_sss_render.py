@@ -73,6 +73,17 @@ def test_a_bare_mesh_is_500_pixels_wide_and_high(workplace):
     assert render("--passes", 1, "--shader", "scalar", source="ball.ply")["image"].shape == (500, 500, 3)
 
 
+def test_a_bare_mesh_takes_its_material_from_a_preset_or_a_file(workplace):
+    """Either is turned into the mesh's unit."""
+    Path("stone.toml").write_text('preset = "marble"\n')
+    common = ("--passes", 1, "--size", "16x16", "--unit", "cm")
+    named = render(*common, "--material", "marble", source="ball.ply")
+    filed = render(*common, "--material", "stone.toml", source="ball.ply")
+    default = render(*common, source="ball.ply")
+    np.testing.assert_array_equal(named["image"], filed["image"])
+    assert not np.array_equal(named["image"], default["image"])
+
+
 def test_64_passes_are_the_default(workplace):
     assert render("--size", "6x5", "--shader", "scalar")["passes"] == 64
 
