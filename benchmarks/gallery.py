@@ -27,7 +27,7 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
     "backlit": (),
     "holes": (),
     "internal_geometry": (),
-    "bunny": (),
+    "bunny": ("128",),
 }
 """Scripts in the order of the page, and what follows the folder on their command lines."""
 TIMED = ("three_shaders",)

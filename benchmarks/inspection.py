@@ -3,7 +3,7 @@
     PYTHONPATH=. xvfb-run -a python benchmarks/inspection.py [--meshes FOLDER] [--out FOLDER] [--page PAGE]
 
 Stills are whole commands, one a mesh of the folder, kept in --out to be looked at. The windows, which need a display
-(xvfb-run makes one), are a ball of 1.3 million faces that turns, and the live picture of elephants of jade and marble.
+(xvfb-run makes one), are a ball of 1.3 million faces that turns, and the live picture of elephants of marble and milk.
 """
 
 from __future__ import annotations
@@ -105,9 +105,9 @@ def windows_table() -> list[str]:
 
         lines.append(_row(f"{len(ball.faces):,} faces, {words}", turned))
     window.close()
-    for medium in ("jade", "marble"):
+    for name in ("marble", "wholemilk"):
         for preview in ("scalar", "plumb"):
-            live = Live(stage_mesh(elephant(), Medium.preset(medium)), LIVE_SIZE, preview)
+            live = Live(stage_mesh(elephant(), Medium.preset(name, "cm")), LIVE_SIZE, preview)
             shown = LiveWindow(live, "elephant")
 
             def moved(live=live, shown=shown) -> None:
@@ -116,8 +116,8 @@ def windows_table() -> list[str]:
                 live.turn(0.05, 0.0)
                 shown.show(live.moving())
 
-            name = f"`--live`, elephant of {medium}, {preview}, {LIVE_SIZE[0]} x {LIVE_SIZE[1]}"
-            lines.append(_row(name, moved))
+            words = f"`--live`, elephant of {name}, {preview}, {LIVE_SIZE[0]} x {LIVE_SIZE[1]}"
+            lines.append(_row(words, moved))
             live.close()
     return lines
 

@@ -40,6 +40,11 @@ def output_folder() -> Path:
     return folder
 
 
+def asked_passes(default: int) -> int:
+    """What follows the folder on the command line."""
+    return int(sys.argv[2]) if len(sys.argv) > 2 else default
+
+
 def window(azimuth: float = 115.0, elevation: float = 33.0) -> RectangleLight:
     """A square of light as large as the distance to it: soft shadows, broad highlights.
 

@@ -6,9 +6,7 @@ The sun stands behind the elephant. Ears, tusks and trunk are a few free flights
 glow. The body is ten times as thick: what comes through has lost all but its red.
 """
 
-import sys
-
-from _common import on_plinth, output_folder, rendered, save_strip, sun
+from _common import asked_passes, on_plinth, output_folder, rendered, save_strip, sun
 
 from sss_tools.elephant import elephant
 from sss_tools.medium import Medium
@@ -18,7 +16,7 @@ ROSE = Medium.from_albedo([0.99, 0.9, 0.82], 40.0, ior=1.5)
 
 def main() -> None:
     """Make the picture."""
-    passes = int(sys.argv[2]) if len(sys.argv) > 2 else 40
+    passes = asked_passes(40)
     renderer = rendered(on_plinth(elephant(), ROSE, sun(176, 48), size=400), "path", passes)
     save_strip([(renderer.film.mean(), f"sun from behind\npath, {passes} passes")], output_folder() / "backlit.png")
 

@@ -7,11 +7,10 @@ the pixels of the object, as a share of their mean; path's own noise is kept out
 of path's samples, whose noises have nothing in common. Path's figure is that noise, its standard error.
 """
 
-import sys
 import time
 
 import numpy as np
-from _common import on_plinth, output_folder, save_strip
+from _common import asked_passes, on_plinth, output_folder, save_strip
 
 from renderer.output.film import Film
 from renderer.render import Renderer, Settings
@@ -21,7 +20,7 @@ from sss_tools.elephant import elephant
 def main() -> None:
     """Make the picture."""
     folder = output_folder()
-    passes = int(sys.argv[2]) if len(sys.argv) > 2 else 40
+    passes = asked_passes(40)
     scene = on_plinth(elephant())
     films: dict[str, Film] = {}
     captions: dict[str, str] = {}
