@@ -124,7 +124,7 @@ class Running:
 
     def _run(self, arguments: list[str], refresh: float | None, before: Callable[[], object]) -> None:
         from cli.sss_render import main
-        from renderer import job
+        from renderer import checkpoint
         from renderer.output.film import Film
 
         code = 70
@@ -134,7 +134,7 @@ class Running:
             sys.stdout, sys.stderr = (io.TextIOWrapper(io.FileIO(k, "w", closefd=False)) for k in (1, 2))
             signal.signal(signal.SIGINT, signal.default_int_handler)
             if refresh is not None:
-                job.REFRESH_EVERY, job.REFRESH_SHARE = refresh, 1.0
+                checkpoint.REFRESH_EVERY, checkpoint.REFRESH_SHARE = refresh, 1.0
             add = Film.add_pass
 
             def counted(film: Film, *rest: object, **named: object) -> None:

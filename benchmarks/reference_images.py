@@ -28,7 +28,8 @@ from pathlib import Path
 import numpy as np
 from first_figures import machine
 
-from renderer.job import Budget, checkpoint_path, execute
+from renderer.checkpoint import checkpoint_path
+from renderer.job import Budget, execute
 from renderer.output.film import Film
 from renderer.render import Renderer, Settings
 from renderer.scene.scene_file import load_scene

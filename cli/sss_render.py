@@ -94,7 +94,9 @@ def _picture(options: Any, started: float) -> int:
 
 def _rendered(options: Any, started: float, client: Client | None = None) -> int:
     """Render, here or on a cluster, and write."""
-    from renderer.job import execute, guide_arrays, rare_event_warnings, report
+    from renderer.guides import guide_arrays
+    from renderer.job import execute
+    from renderer.report import rare_event_warnings, report
     from renderer.stages import Stages
 
     stages = Stages()
@@ -323,8 +325,8 @@ def _piloted(
 
 def _explain_only(options: Any) -> int:
     """Print, and report where asked for, what would be done with each object."""
-    from renderer.job import plan_report
     from renderer.render import closed_for_light, planned
+    from renderer.report import plan_report
     from renderer.shaders.selection import picture_passes
     from renderer.stages import Stages
 

@@ -10,8 +10,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from renderer import job
-from renderer.job import Budget, checkpoint_path, execute
+from renderer import checkpoint, job
+from renderer.checkpoint import checkpoint_path
+from renderer.job import Budget, execute
 from renderer.output import image
 from sss_tools import reading
 from sss_tools.errors import InputError
@@ -46,7 +47,7 @@ def test_a_picture_that_cannot_be_written_is_kept_elsewhere_and_resumed(tmp_path
     out, elsewhere = tmp_path / "here" / "out.png", tmp_path / "elsewhere"
     out.parent.mkdir()
     elsewhere.mkdir()
-    monkeypatch.setattr(job.tempfile, "tempdir", str(elsewhere))
+    monkeypatch.setattr(checkpoint.tempfile, "tempdir", str(elsewhere))
     write = image.write
     monkeypatch.setattr(image, "write", lambda path, *rest: (full if path.parent == out.parent else write)(path, *rest))
     with pytest.raises(InputError) as raised:
@@ -61,8 +62,8 @@ def test_a_picture_that_cannot_be_written_is_kept_elsewhere_and_resumed(tmp_path
 
 def test_a_checkpoint_that_could_not_be_written_is_tried_again_with_one_warning(tmp_path, monkeypatch):
     for name in ("REFRESH_EVERY", "RETRY_EVERY"):
-        monkeypatch.setattr(job, name, 0.0)
-    monkeypatch.setattr(job, "REFRESH_SHARE", 1e9)
+        monkeypatch.setattr(checkpoint, name, 0.0)
+    monkeypatch.setattr(checkpoint, "REFRESH_SHARE", 1e9)
     out = tmp_path / "out.npz"
     write, tried = image.write, []
 

@@ -19,8 +19,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ..job import rare_event_warnings
 from ..render import Renderer
+from ..report import rare_event_warnings
 from ..scene.scene_file import load_scene
 from ..shaders.appearance import appearance
 from ..shaders.selection import select, tolerance

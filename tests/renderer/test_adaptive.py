@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from renderer import adaptive
-from renderer.job import Budget, checkpoint_path, execute
+from renderer.checkpoint import checkpoint_path
+from renderer.job import Budget, execute
 from renderer.output import image
 from renderer.output.film import Film
 from renderer.render import Renderer, Settings

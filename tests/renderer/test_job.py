@@ -8,10 +8,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from renderer import job
-from renderer.job import Budget, checkpoint_path, execute, guide_arrays, light_methods, merged, report
+from renderer import checkpoint, job
+from renderer.checkpoint import Refreshed, checkpoint_path
+from renderer.guides import guide_arrays
+from renderer.job import Budget, execute, merged
 from renderer.output import image
 from renderer.render import Renderer, Settings
+from renderer.report import light_methods, rare_event_warnings, report
 from renderer.scene.description import DirectionalLight, EnvironmentLight, PointLight, RectangleLight
 from sss_tools import shapes
 from sss_tools.errors import InputError
@@ -35,8 +38,8 @@ def test_what_is_left_of_a_budget():
 
 
 def test_passes_are_rendered_and_written_and_the_checkpoint_goes(tmp_path, monkeypatch):
-    monkeypatch.setattr(job, "REFRESH_EVERY", 0.0)
-    monkeypatch.setattr(job, "REFRESH_SHARE", 1e9)
+    monkeypatch.setattr(checkpoint, "REFRESH_EVERY", 0.0)
+    monkeypatch.setattr(checkpoint, "REFRESH_SHARE", 1e9)
     seen = []
     out = tmp_path / "out.npz"
 
@@ -107,7 +110,7 @@ def test_an_interrupt_writes_the_picture_and_keeps_the_film_for_resume(tmp_path)
 
 def test_an_interrupted_npz_is_its_own_checkpoint(tmp_path, monkeypatch):
     """An older one beside it would be resumed in its place."""
-    monkeypatch.setattr(job, "REFRESH_EVERY", 0.0)
+    monkeypatch.setattr(checkpoint, "REFRESH_EVERY", 0.0)
 
     def interrupt(done, total, text):
         if done == 3:
@@ -186,7 +189,7 @@ def test_leaks_are_held_against_one_in_a_hundred_thousand_and_chance(samples, le
     renderer = ready()
     renderer.tally.samples = samples
     renderer.tally.leak(0, np.zeros((3, leaked), np.float32))
-    found = job.rare_event_warnings(renderer)
+    found = rare_event_warnings(renderer)
     assert bool(found) == warns
     assert not warns or f"{leaked} of {samples} paths" in found[0]
 
@@ -194,13 +197,13 @@ def test_leaks_are_held_against_one_in_a_hundred_thousand_and_chance(samples, le
 def test_samples_that_are_not_finite_are_warned_of():
     renderer = ready()
     renderer.run(range(2))
-    assert job.rare_event_warnings(renderer) == []
+    assert rare_event_warnings(renderer) == []
     renderer.film.left_out[0, 0] = 1
-    assert "1 samples (2.6e-03 of all) were not finite" in job.rare_event_warnings(renderer)[0]
+    assert "1 samples (2.6e-03 of all) were not finite" in rare_event_warnings(renderer)[0]
 
 
 def test_a_preview_that_can_no_longer_be_written_does_not_end_the_render(tmp_path, monkeypatch):
-    monkeypatch.setattr(job, "REFRESH_EVERY", 0.0)
+    monkeypatch.setattr(checkpoint, "REFRESH_EVERY", 0.0)
     folder = tmp_path / "gone"
     folder.mkdir()
 
@@ -215,12 +218,12 @@ def test_a_preview_that_can_no_longer_be_written_does_not_end_the_render(tmp_pat
 def test_writing_again_and_again_takes_a_small_share_of_the_time(tmp_path, monkeypatch):
     """A clock that writing moves on by 3 s: the next is due 60 s later."""
     clock = [1000.0]
-    monkeypatch.setattr(job.time, "monotonic", lambda: clock[0])
-    monkeypatch.setattr(job.image, "write", lambda *_: clock.__setitem__(0, clock[0] + 3))
-    kept, renderer = job._Refreshed(tmp_path / "preview.png"), ready()
-    kept.refresh(renderer, Budget())
+    monkeypatch.setattr(checkpoint.time, "monotonic", lambda: clock[0])
+    monkeypatch.setattr(checkpoint.image, "write", lambda *_: clock.__setitem__(0, clock[0] + 3))
+    kept, renderer = Refreshed(tmp_path / "preview.png"), ready()
+    kept.refresh(renderer, 0.0)
     assert kept.due == pytest.approx(1003 + 60)
-    kept.refresh(renderer, Budget())
+    kept.refresh(renderer, 0.0)
     assert clock[0] == 1003
 
 
