@@ -31,7 +31,7 @@ BINS = 512
 SMALLEST, LARGEST = 1.0, 128.0
 """Radii of the tables in mean free paths of the densest channel. A ball of 1 stands for 1.4 collisions, of 2 for 3.7,
 of 128 for eight thousand, and hardly any path needs a larger one."""
-_FORMULA = "ball jump 3"
+_FORMULA = "ball jump 4"
 _STEPS_PER_OCTAVE = 4
 _COUNT = int(np.log2(LARGEST / SMALLEST)) * _STEPS_PER_OCTAVE + 1
 _SHIFT = 23 - 2  # all but the exponent and two bits of the mantissa of a float32

@@ -47,17 +47,17 @@ def closed_form_weight(radius: float, albedo: float) -> float:
     return (rate * radius * np.cosh(rate * z) + np.sinh(rate * z)) / np.sinh(rate * (radius + z))
 
 
-@pytest.mark.parametrize("radius", [0.1, 1, 2, 8, 32, 128])
+@pytest.mark.parametrize("radius", [0.1, 1, 2, 8, 32, 128, 512])
 def test_without_absorption_all_light_leaves(radius):
-    """By integrals along chords of a solution that knows nothing of it; the error grows with the collisions."""
-    assert ball_exit(radius, [1.0]).weight[0] == pytest.approx(1, abs=1e-5)
+    """By integrals along chords of a solution that knows nothing of it."""
+    assert ball_exit(radius, [1.0]).weight[0] == pytest.approx(1, abs=3e-7)
 
 
 @pytest.mark.parametrize("radius", [0.5, 2, 8, 32])
 def test_what_does_not_leave_is_absorbed(radius):
     albedos = np.array([0.3, 0.9, 0.99, 0.999])
     ball = ball_exit(radius, albedos)
-    assert_allclose(ball.weight, 1 - (1 - albedos) * ball.collisions, atol=1e-6)
+    assert_allclose(ball.weight, 1 - (1 - albedos) * ball.collisions, atol=3e-7)
 
 
 def test_less_leaves_larger_and_darker_balls():
