@@ -38,6 +38,7 @@ from sss_tools.shapes import box
 ROOT = Path(__file__).resolve().parents[1]
 FAMILY = 1e-3
 INFINITE = "inf"
+LEAST_VALUE = 1e-3
 LEAST_MEANS = 12
 """Fewer tell too little of their own error for z to be normal."""
 DIFFUSE_VIEWS = 4
@@ -130,8 +131,8 @@ def cases(tables: dict) -> list[Case]:
     found = []
 
     def add(row, tau, what, value, uncertainty):
-        # of a value of nothing there is no relative error
-        if value > 1e-4:
+        # smaller shares are carried by so few paths that their spread is not seen before most of them are
+        if value > LEAST_VALUE:
             found.append(Case(row["albedo"], tau, row["g"], row["n"], what, value, max(uncertainty, 5e-7)))
 
     quantities = ("R_normal", "T_normal", "R_diffuse", "T_diffuse")
