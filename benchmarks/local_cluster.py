@@ -7,11 +7,22 @@ import os
 import subprocess
 import sys
 import time
+from collections.abc import Mapping
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
 PATIENCE = 120.0
 """Seconds to wait for processes to come up on a busy machine."""
+FOR_LONG = {
+    "DASK_DISTRIBUTED__ADMIN__LOW_LEVEL_LOG_LENGTH": "50",
+    "DASK_DISTRIBUTED__ADMIN__LOG_LENGTH": "100",
+    "DASK_DISTRIBUTED__ADMIN__SYSTEM_MONITOR__LOG_LENGTH": "600",
+    "DASK_DISTRIBUTED__DIAGNOSTICS__COMPUTATIONS__MAX_HISTORY": "10",
+    "DASK_DISTRIBUTED__SCHEDULER__EVENTS_CLEANUP_DELAY": "1 minute",
+    "DASK_DISTRIBUTED__WORKER__PROFILE__ENABLED": "False",
+}
+"""Dask's settings for clusters that live for hours, as docs/scaling.md gives them: shorter histories. With its own ones
+a scheduler keeps the last 1000 messages to each worker, among them every scene of less than a megabyte."""
 
 
 class LocalCluster:
@@ -20,10 +31,12 @@ class LocalCluster:
     folder     for the scheduler's file and what the processes write
     scheduler  its process
     workers    theirs, of one thread each and without a nanny, so that one that is killed is gone
+
+    ``environment`` is added to that of all processes.
     """
 
-    def __init__(self, folder: Path, workers: int = 0, port: int = 0):
-        self.folder, self.workers = folder, []
+    def __init__(self, folder: Path, workers: int = 0, port: int = 0, environment: Mapping[str, str] | None = None):
+        self.folder, self.workers, self._environment = folder, [], environment or {}
         self._file = folder / "scheduler.json"
         self._file.unlink(missing_ok=True)
         self.scheduler = self._start("scheduler", "--port", str(port))
@@ -58,7 +71,7 @@ class LocalCluster:
 
     def _start(self, kind: str, *options: str) -> subprocess.Popen:
         more = ("--scheduler-file", str(self._file)) if kind == "scheduler" else ()
-        environment = {**os.environ, "PYTHONPATH": str(ROOT), "OPENBLAS_NUM_THREADS": "1"}
+        environment = {**os.environ, "PYTHONPATH": str(ROOT), "OPENBLAS_NUM_THREADS": "1", **self._environment}
         with Path(self.folder, f"{kind}.log").open("ab") as log:
             return subprocess.Popen(
                 [sys.executable, "-m", "dask", kind, *options, *more, "--no-dashboard", "--host", "127.0.0.1"],

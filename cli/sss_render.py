@@ -78,18 +78,22 @@ def _render(argv: Sequence[str] | None) -> int:
 def _picture(options: Any, started: float) -> int:
     """Render and write."""
     from renderer.output.image import check_writable
+    from renderer.tracing.memory import give_back_memory
 
     check_writable(options.output)
     if options.preview is not None:
         check_writable(options.preview)
     if options.report is not None:
         _check_report(options.report)
-    if options.scheduler is None:
-        return _rendered(options, started)
-    from sss_tools.scheduler import connected
+    try:
+        if options.scheduler is None:
+            return _rendered(options, started)
+        from sss_tools.scheduler import connected
 
-    with connected(options.scheduler) as client:
-        return _rendered(options, started, client)
+        with connected(options.scheduler) as client:
+            return _rendered(options, started, client)
+    finally:
+        give_back_memory()  # the renderer is gone; the process may go on
 
 
 def _rendered(options: Any, started: float, client: Client | None = None) -> int:

@@ -6,6 +6,7 @@ import os
 import time
 from collections.abc import Callable, Iterable, Mapping
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from hashlib import blake2b
 from queue import Empty, SimpleQueue
@@ -106,6 +107,12 @@ class Renderer:
         # their buffers outlive the threads of one ``run``
         self._idle: SimpleQueue[Wavefront | direct.DirectTracer] = SimpleQueue()
         self._under_way: Strips | None = None
+
+    def forget_buffers(self) -> None:
+        """Drop what is kept for the next ``run``, which then takes new memory: for renderers that may stay idle."""
+        with suppress(Empty):
+            while True:
+                self._idle.get_nowait()
 
     def look_from(self, camera: Camera) -> None:
         """Begin a new film from another camera; whatever was built for the scene stays.

@@ -85,7 +85,9 @@ def _renderer(parcel: bytes) -> Renderer:
         if key not in _built:
             if len(_built) == KEPT_SCENES:
                 _built.popitem(last=False)
-                give_back_memory()
+            for other in _built.values():
+                other.forget_buffers()
+            give_back_memory()
             sent: Parcel = pickle.loads(parcel)
             _built[key] = Renderer(sent.scene, sent.settings, sent.passes, measured=sent.measured)
         _built.move_to_end(key)
