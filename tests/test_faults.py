@@ -25,12 +25,13 @@ ROOT = Path(__file__).parents[1]
 @pytest.mark.skipif(sys.platform != "linux", reason="forks, signals and mounts of Linux")
 def test_no_fault_spoils_a_pixel_or_a_file_and_what_was_finished_is_kept():
     done = subprocess.run(
-        [sys.executable, str(ROOT / "benchmarks/faults.py"), "--count", "3", "--refresh", "0.05", "--json"],
+        [sys.executable, str(ROOT / "benchmarks/faults.py"), "--count", "3", "--refresh", "0.05", "--json",
+         "--cluster-passes", "96"],
         capture_output=True,
         text=True,
-        timeout=900,
+        timeout=1800,
         env={**os.environ, "PYTHONPATH": str(ROOT)},
-    )
+    )  # fmt: skip
     results = {trials["fault"]: trials for trials in json.loads(done.stdout)}
     assert {name: trials["broken"] for name, trials in results.items() if trials["broken"] or trials["wrong"]} == {}
     # an interrupt loses nothing that was finished, nor does a full disk

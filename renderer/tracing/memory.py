@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import ctypes
+import os
 import sys
 from typing import Any
 
-_M_TRIM_THRESHOLD, _M_MMAP_THRESHOLD = -1, -3  # malloc.h
+_M_TRIM_THRESHOLD, _M_MMAP_THRESHOLD, _M_ARENA_MAX = -1, -3, -8  # malloc.h
 _KEEP = 1 << 28
 
 
@@ -14,10 +15,13 @@ def keep_freed_memory() -> None:
     """Tell glibc to keep up to 256 MB that are freed instead of giving them back page by page.
 
     By default arrays above 128 kB are mapped afresh each time, and clearing their pages makes threads wait for
-    each other. Does nothing where there is no glibc.
+    each other. Threads share as many arenas as there are cores, and one: each keeps at its end what its largest arrays
+    took, which is never given back, and by default there are up to eight a core, so that memory grows as threads come
+    and go. Does nothing where there is no glibc.
     """
     mallopt = _of_glibc("mallopt")
     if mallopt is not None:
+        mallopt(_M_ARENA_MAX, (os.cpu_count() or 1) + 1)
         mallopt(_M_MMAP_THRESHOLD, _KEEP)
         mallopt(_M_TRIM_THRESHOLD, _KEEP)
 

@@ -2,10 +2,12 @@
 
 import json
 import os
+import pickle
 import signal
 import subprocess
 import sys
 import time
+from collections import OrderedDict
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +17,9 @@ pytest.importorskip("distributed")
 
 from benchmarks.local_cluster import LocalCluster
 from cli.sss_render import main
+from renderer.cluster import worker
 from renderer.cluster.renderer import ClusterRenderer
+from renderer.cluster.task import Parcel, Task
 from renderer.render import Renderer, Settings
 from sss_tools import shapes
 from sss_tools.scheduler import connected
@@ -80,7 +84,7 @@ def started(out, address, *options):
 
 
 def wait_for(path, process):
-    deadline = time.monotonic() + 60
+    deadline = time.monotonic() + 300
     while not Path(path).exists():
         assert process.poll() is None and time.monotonic() < deadline, process.communicate()
         time.sleep(0.01)
@@ -128,6 +132,21 @@ def test_films_of_a_camera_path_are_those_rendered_here(cluster, shader):
             here.run(range(3))
             np.testing.assert_array_equal(film.sum, here.film.sum)
             np.testing.assert_array_equal(film.hits, here.film.hits)
+
+
+def test_a_worker_keeps_two_scenes_and_the_buffers_of_the_last_alone(monkeypatch):
+    monkeypatch.setattr(worker, "_built", OrderedDict())
+    things = [placed(shapes.icosphere(1.0, 2), translucent(), name="ball")]
+    scenes = [scene(things, [WHITE_SKY], camera((0, 0, far), resolution=(8, 8))) for far in (4.0, 5.0, 6.0)]
+    parcels = [pickle.dumps(Parcel(one, Settings(shader="path"), 2, None)) for one in scenes]
+    first = worker.render(parcels[0], Task((0, 1)))
+    for parcel in parcels[1:]:
+        worker.render(parcel, Task((0, 1)))
+    assert [built._idle.qsize() for built in worker._built.values()] == [0, 1]
+    again = worker.render(parcels[0], Task((0, 1)))
+    assert len(worker._built) == 2 and again.hash == first.hash
+    for one, other in zip(first.passes, again.passes, strict=True):
+        np.testing.assert_array_equal(one.radiance, other.radiance)
 
 
 def test_a_worker_that_is_killed_costs_no_pass(workplace, cluster):

@@ -25,3 +25,30 @@ def test_arrays_used_again_and_again_cost_no_page_faults():
     """20 arrays of 8 MB are 40,000 small pages where memory goes back in between; huge pages need fewer."""
     done = subprocess.run([sys.executable, "-c", CODE, "keep"], capture_output=True, text=True, check=True)
     assert int(done.stdout) < 20
+
+
+THREADS = """
+import os, sys, threading
+os.cpu_count = lambda: 2
+import numpy as np
+from renderer.tracing.memory import give_back_memory, keep_freed_memory
+keep_freed_memory()
+stop, idle = threading.Event(), []
+for _ in range(10):
+    work = threading.Thread(target=lambda: np.ones(3 << 20).sum())
+    work.start()
+    work.join()
+    # who comes next finds the arenas so far in use
+    idle.append(threading.Thread(target=lambda: (np.ones(1000), stop.wait())))
+    idle[-1].start()
+give_back_memory()
+print(int(open("/proc/self/statm").read().split()[1]) * os.sysconf("SC_PAGE_SIZE"))
+stop.set()
+"""
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="glibc's malloc is asked for")
+def test_memory_does_not_grow_as_threads_come_and_go():
+    """Three arenas keep 24 MB each at most, and the interpreter with NumPy takes 40; ten arenas would keep 240."""
+    done = subprocess.run([sys.executable, "-c", THREADS], capture_output=True, text=True, check=True)
+    assert int(done.stdout) < 150e6
