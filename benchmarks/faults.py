@@ -291,7 +291,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--count", type=int, default=40, help="of each signal; a quarter as many full disks")
     parser.add_argument("--passes", type=int, default=PASSES)
-    parser.add_argument("--cluster-passes", type=int, default=20 * PASSES, help="of renders on a cluster; 0: none")
+    parser.add_argument("--cluster-passes", type=int, default=10 * PASSES, help="of renders on a cluster; 0: none")
     parser.add_argument("--refresh", type=float, help="seconds between checkpoints, instead of the command's own")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--json", action="store_true")
