@@ -3,7 +3,8 @@
     PYTHONPATH=. python benchmarks/cluster.py --json docs/scaling.json --page docs/scaling.md
 
 Renders the same picture by one and two threads of one process, and by a Dask cluster of one and of two workers of one
-thread, in turn, as often as ``--repeats`` says, each long enough for about a minute of one thread (``--seconds``).
+thread, in turn, as often as ``--repeats`` says, each long enough for about a minute of one thread (``--seconds``). Dask
+is set as docs/scaling.md advises.
 Every picture must have the same bits. Processor seconds are of all processes that take part; where other work shares
 the machine, they can be compared and wall seconds cannot. The plan for many machines is computed from measurements.
 ``--from JSON`` writes the page again without measuring.
@@ -27,7 +28,7 @@ from typing import Any
 
 import numpy as np
 import psutil
-from local_cluster import ROOT, LocalCluster
+from local_cluster import ADVISED, ROOT, LocalCluster
 
 from renderer.cluster.queue import AHEAD, HELD_BYTES
 from renderer.output import image
@@ -122,7 +123,10 @@ def measure(seconds: float, repeats: int, size: int) -> dict[str, Any]:
         (folder / "elephant.ply").write_bytes(ply_bytes(elephant()))
         for kind in ("one", "two"):
             (folder / kind).mkdir()
-        with LocalCluster(folder / "one", 1) as one, LocalCluster(folder / "two", 2) as two:
+        with (
+            LocalCluster(folder / "one", 1, environment=ADVISED) as one,
+            LocalCluster(folder / "two", 2, environment=ADVISED) as two,
+        ):
             clusters = {"one worker": one, "two workers": two}
             one.wait_for_workers(1)
             two.wait_for_workers(2)

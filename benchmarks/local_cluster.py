@@ -13,7 +13,7 @@ from pathlib import Path
 ROOT = Path(__file__).parents[1]
 PATIENCE = 120.0
 """Seconds to wait for processes to come up on a busy machine."""
-FOR_LONG = {
+ADVISED = {
     "DASK_DISTRIBUTED__ADMIN__LOW_LEVEL_LOG_LENGTH": "50",
     "DASK_DISTRIBUTED__ADMIN__LOG_LENGTH": "100",
     "DASK_DISTRIBUTED__ADMIN__SYSTEM_MONITOR__LOG_LENGTH": "600",
@@ -21,8 +21,8 @@ FOR_LONG = {
     "DASK_DISTRIBUTED__SCHEDULER__EVENTS_CLEANUP_DELAY": "1 minute",
     "DASK_DISTRIBUTED__WORKER__PROFILE__ENABLED": "False",
 }
-"""Dask's settings for clusters that live for hours, as docs/scaling.md gives them: shorter histories. With its own ones
-a scheduler keeps the last 1000 messages to each worker, among them every scene of less than a megabyte."""
+"""Dask's settings as docs/scaling.md advises them. With its own, a scheduler keeps the last 1000 messages to each
+worker, among them every scene of less than a megabyte, and sampling what workers do takes a seventh of their time."""
 
 
 class LocalCluster:

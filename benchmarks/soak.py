@@ -31,7 +31,7 @@ from pathlib import Path
 
 import numpy as np
 import psutil
-from local_cluster import FOR_LONG, LocalCluster
+from local_cluster import ADVISED, LocalCluster
 from scipy.stats import theilslopes
 
 from cli import sss_check, sss_render
@@ -223,7 +223,7 @@ def soak(minutes: float, keep: Callable[[list[Sample]], None]) -> list[Sample]:
         os.environ["TMPDIR"] = tempfile.tempdir = str(scratch)
         os.environ["SSS_TOOLS_CACHE"] = str(Path(name, "cache"))
         os.chdir(folder)
-        with LocalCluster(Path(name, "dask"), 2, environment=FOR_LONG) as cluster:
+        with LocalCluster(Path(name, "dask"), 2, environment=ADVISED) as cluster:
             cluster.wait_for_workers(2)
             start = kept = time.monotonic()
             for job in Work(folder, cluster).jobs():
