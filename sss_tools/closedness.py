@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from dataclasses import asdict, dataclass, fields
 from typing import Any, Literal, get_args
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
@@ -152,11 +153,23 @@ class Assessment:
         return np.flatnonzero(np.isin(self.component_of_face, components))
 
 
-def assess(mesh: Mesh) -> Assessment:
-    """Find the components, their roles and holes, and decide how closed the mesh is.
+_ASSESSED: WeakKeyDictionary[Mesh, Assessment] = WeakKeyDictionary()
+"""Of meshes that are still there: a check, the closing of holes and a repair ask for the same one."""
 
+
+def assess(mesh: Mesh) -> Assessment:
+    """Find the components, their roles and holes, and decide how closed the mesh is; once for each mesh.
+
+    All it asks for are the welded points of ``mesh.topology`` and the faces over them.
     Raises ValueError for a mesh without faces or with coordinates that are not finite.
     """
+    found = _ASSESSED.get(mesh)
+    if found is None:
+        found = _ASSESSED[mesh] = _assess(mesh)
+    return found
+
+
+def _assess(mesh: Mesh) -> Assessment:
     if len(mesh.faces) == 0:
         raise ValueError("a mesh without faces is neither open nor closed")
     if not np.isfinite(mesh.vertices[mesh.faces]).all():

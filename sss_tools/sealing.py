@@ -9,6 +9,7 @@ a place would say less than outside. One that passes through other components st
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import combinations
 
 import numpy as np
@@ -123,13 +124,14 @@ def seal(mesh: Mesh, caps: bool = True) -> Sealed:
     loops = missing_loops(upright)
     turned = int((upright.faces != draft.faces).any(axis=1).sum())
     body = upright.mesh
-    made = _caps(upright, loops, smooth=True)
-    crossing, overlapping = _crossing(body, made)
+    whole = _Whole(body, _caps(upright, loops, smooth=True))
+    crossing, overlapping = _crossing(whole)
     if crossing.any():
         plain = _caps(upright, loops, smooth=False)
-        made = [simple if crosses else cap for cap, simple, crosses in zip(made, plain, crossing, strict=True)]
-        crossing, overlapping = _crossing(body, made)
-    made = _apart(upright, made)
+        made = [simple if crosses else cap for cap, simple, crosses in zip(whole.caps, plain, crossing, strict=True)]
+        whole = _Whole(body, made)
+        crossing, overlapping = _crossing(whole)
+    made = _apart(upright, whole.caps)
     measures = [_measured(loop, body.topology.points) for loop in loops]
     if loops:
         measures = _seen_from_inside(body, made, measures)
@@ -138,7 +140,9 @@ def seal(mesh: Mesh, caps: bool = True) -> Sealed:
         Loop(len(loop), *measure, float(np.ptp(body.topology.points[loop], axis=0).max()), cap is not None)
         for loop, measure, cap in zip(loops, measures, kept, strict=True)
     )
-    return Sealed(_joined(body, kept), len(body.faces), turned, overlapping, described)
+    # what was looked at has its topology already
+    sealed = whole.mesh if kept == whole.caps else _Whole(body, kept).mesh
+    return Sealed(sealed, len(body.faces), turned, overlapping, described)
 
 
 def _caps(draft: Draft, loops: list[Indices], smooth: bool) -> list[_Cap | None]:
@@ -159,41 +163,53 @@ def _caps(draft: Draft, loops: list[Indices], smooth: bool) -> list[_Cap | None]
     return made
 
 
-def _joined(body: Mesh, caps: list[_Cap | None]) -> Mesh:
-    """The body, its exactly equal positions taken as one, and the caps after it."""
-    topology = body.topology
-    points, faces, count = [topology.points], [topology.faces], len(topology.points)
-    for cap in caps:
-        if cap is None:
-            continue
-        new = len(cap.corners) - len(cap.loop)
-        number = np.concatenate([cap.loop, count + np.arange(new)])
-        points.append(cap.corners[len(cap.loop) :])
-        faces.append(number[cap.triangles])
-        count += new
-    return Mesh(np.concatenate(points), np.concatenate(faces))
+@dataclass(frozen=True, eq=False)
+class _Whole:
+    """A body with caps, or None where a loop has none."""
+
+    body: Mesh
+    caps: list[_Cap | None]
+
+    @cached_property
+    def mesh(self) -> Mesh:
+        """The body, its exactly equal positions taken as one, and the caps after it."""
+        topology = self.body.topology
+        points, faces, count = [topology.points], [topology.faces], len(topology.points)
+        for cap in self.caps:
+            if cap is None:
+                continue
+            new = len(cap.corners) - len(cap.loop)
+            number = np.concatenate([cap.loop, count + np.arange(new)])
+            points.append(cap.corners[len(cap.loop) :])
+            faces.append(number[cap.triangles])
+            count += new
+        return Mesh(np.concatenate(points), np.concatenate(faces))
 
 
-def _crossing(body: Mesh, caps: list[_Cap | None]) -> tuple[NDArray[np.bool_], bool]:
+def _crossing(joined: _Whole) -> tuple[NDArray[np.bool_], bool]:
     """(loops,) whether a cap passes through the component whose hole it closes by more than a fold, or is none; of two
     caps of one component that pass through each other, the larger one. And whether any cap meets any surface.
 
     Other components do no harm: shells that are closed each for themselves add up to a union.
     """
+    body, caps = joined.body, joined.caps
     crosses = np.array([cap is None for cap in caps], bool)
     present = [cap for cap in caps if cap is not None]
     if not present:
         return crosses, False
-    whole = _joined(body, caps)
+    whole = joined.mesh
     owner = np.full(len(whole.faces), -1)
     owner[len(body.faces) :] = np.repeat(np.flatnonzero(~crosses), [len(cap.triangles) for cap in present])
     component = whole.topology.component_of_face
     # only what shares a cap's box can meet it
-    corners = whole.vertices[whole.faces]
-    lower, upper = corners.min(axis=1), corners.max(axis=1)
     near = owner >= 0
+    lower, upper = _boxes(whole)
     for cap in present:
-        near |= ((lower <= cap.corners.max(axis=0)) & (upper >= cap.corners.min(axis=0))).all(axis=1)
+        meets = np.ones(len(owner), bool)
+        for axis in range(3):
+            meets &= lower[axis] <= cap.corners[:, axis].max()
+            meets &= upper[axis] >= cap.corners[:, axis].min()
+        near |= meets
     faces = np.flatnonzero(near)
     pairs = faces[self_intersections(Mesh(whole.vertices, whole.faces[faces]).topology)]
     pairs = pairs[(owner[pairs] >= 0).any(axis=1)]
@@ -207,9 +223,19 @@ def _crossing(body: Mesh, caps: list[_Cap | None]) -> tuple[NDArray[np.bool_], b
             crosses[max(one, other, key=size.__getitem__)] = True
     kept = own & ~crosses[np.maximum(owner[pairs], 0)].any(axis=1)
     remaining = [None if out else cap for cap, out in zip(caps, crosses, strict=True)]
-    if kept.any() and _less_than_outside(_joined(body, remaining)) > FOLD:
+    if kept.any() and _less_than_outside(_Whole(body, remaining).mesh) > FOLD:
         crosses[np.setdiff1d(owner[pairs[kept]], [-1])] = True
     return crosses, len(pairs) > 0
+
+
+def _boxes(mesh: Mesh) -> tuple[list[Float64], list[Float64]]:
+    """Least and greatest coordinates of each face, (m,) for each axis."""
+    lower, upper = [], []
+    for column in mesh.vertices.T:
+        a, b, c = (column[corner] for corner in mesh.faces.T)
+        lower.append(np.minimum(np.minimum(a, b), c))
+        upper.append(np.maximum(np.maximum(a, b), c))
+    return lower, upper
 
 
 def _folded_share(whole: Mesh, owner: Indices, pairs: Indices, count: int) -> NDArray[np.float64]:
@@ -249,7 +275,7 @@ def _apart(draft: Draft, caps: list[_Cap | None]) -> list[_Cap | None]:
         if of_point[one[1].loop[0]] != of_point[other[1].loop[0]] and _coincide(one[1], other[1]):
             place, smaller = min(one, other, key=lambda pair: pair[1].width)
             bulged = _bulged(smaller)
-            if not _crossing(draft.mesh, [bulged])[0][0]:
+            if not _crossing(_Whole(draft.mesh, [bulged]))[0][0]:
                 caps[place] = bulged
     return caps
 

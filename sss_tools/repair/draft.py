@@ -44,9 +44,17 @@ class Draft:
 
     @cached_property
     def mesh(self) -> Mesh:
-        """The geometry alone, without points that no face uses."""
-        used, faces = np.unique(self.faces, return_inverse=True)
-        return Mesh(self.points[used], faces.reshape(-1, 3))
+        """The geometry alone, without points that no face uses; the source itself where that is all it is."""
+        used = np.zeros(len(self.points), bool)
+        used[self.faces] = True
+        if self._as_in_source and used.all() and len(self.points) == len(self.source.vertices):
+            return self.source
+        return Mesh(self.points[used], (np.cumsum(used) - 1)[self.faces])
+
+    @property
+    def _as_in_source(self) -> bool:
+        topology = self.source.topology
+        return self.points is topology.points and self.faces is topology.faces
 
     @property
     def topology(self) -> Topology:
@@ -56,7 +64,8 @@ class Draft:
     @cached_property
     def assessment(self) -> Assessment:
         """Components, roles and holes of ``mesh``. Raises ValueError where no face is left."""
-        return assess(self.mesh)
+        # which looks at welded points in use alone
+        return assess(self.source if self._as_in_source else self.mesh)
 
     @property
     def diagonal(self) -> float:
