@@ -72,21 +72,25 @@ def _joins(triangles, taken) -> bool:
 def _least_area(points, taken) -> NDArray[np.int64] | None:
     """The triangulation of least area, by dynamic programming over stretches of the curve."""
     count = len(points)
-    cost = np.zeros((count, count))
+    # by where a stretch starts and how long it is, so that all of one length are slices; costs by where it ends, too
+    end = np.minimum(np.arange(count)[:, None] + np.arange(count), count - 1)
+    ways = [column[end] - column[:, None] for column in points.T]
+    cost, cost_by_end = np.zeros((count, count)), np.zeros((count, count))
     split = np.zeros((count, count), np.int64)
     for gap in range(2, count):
         i = np.arange(count - gap)
         j = i + gap
-        k = i[:, None] + np.arange(1, gap)
-        a, b, c = points[i][:, None], points[k], points[j][:, None]
-        area = np.linalg.norm(np.cross(b - a, c - a), axis=2)
-        total = cost[i[:, None], k] + cost[k, j[:, None]] + area
+        (ux, uy, uz), (vx, vy, vz) = zip(*((way[:-gap, 1:gap], way[:-gap, gap, None]) for way in ways), strict=True)
+        x, y, z = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
+        area = np.sqrt(x * x + y * y + z * z)
+        total = cost[:-gap, 1:gap] + cost_by_end[gap:, gap - 1 : 0 : -1] + area
         best = np.argmin(total, axis=1)
-        cost[i, j] = total[np.arange(len(i)), best]
-        split[i, j] = k[np.arange(len(i)), best]
+        least = total[i, best]
+        split[i, j] = i + 1 + best
         if gap < count - 1:
-            cost[i, j] = np.where(taken[i, j], np.inf, cost[i, j])
-    if not np.isfinite(cost[0, -1]):
+            least = np.where(taken[i, j], np.inf, least)
+        cost[i, gap] = cost_by_end[j, gap] = least
+    if not np.isfinite(cost[0, count - 1]):
         return None
     triangles, stretches = [], [(0, count - 1)]
     while stretches:
