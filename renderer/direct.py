@@ -109,9 +109,11 @@ def _parts(columns: NDArray[np.intp]) -> list[NDArray[np.intp]]:
 
 
 def _blocks(rays: list[Group]) -> Iterator[Group]:
-    """All rays, in full blocks."""
+    """All rays, in blocks that are full, or nearly."""
     rays = [each for each in rays if len(each)]
-    if rays:
+    if 2 * sum(map(len, rays)) > BLOCK * len(rays):
+        yield from rays
+    elif rays:
         kind = type(rays[0])
         columns = [[getattr(each, column.name) for each in rays] for column in fields(kind)]
         whole = kind(*(np.concatenate(column, axis=-1) for column in columns))
@@ -170,7 +172,8 @@ class _Frame:
         """Add the radiance of the sky and of lights with an extent; they end every ray."""
         lights = self._scene.lights
         sky = np.flatnonzero(triangle == -1)
-        self._add(rays, sky, lights.background(rays.direction.take(sky, axis=1)))
+        seen = np.zeros((3, 1), np.float32) if lights.even else rays.direction.take(sky, axis=1)
+        self._add(rays, sky, lights.background(seen))
         for k, sphere in enumerate(lights.spheres):
             self._add(rays, np.flatnonzero(triangle == -2 - k), sphere.radiance)
         for k, rectangle in enumerate(lights.rectangles):

@@ -84,62 +84,72 @@ class Met(_Columns):
 
 
 class FaceTable:
-    """What is looked up of a triangle, side by side in one row: its plane, and normal and curvature at its corners.
+    """What is looked up of a triangle, side by side in one row.
 
-    rows     (t, 16) float32: normal and curvature of each corner, normal of the triangle, its plane's distance
+    rows     (t, 8) float32: its unit normal, its plane's distance, curvature at its corners; and a zero, as rows of
+             32 bytes are gathered fastest
+    normals  (t, 9) float32 or None: shading normal at each corner; None where shading normals are those of triangles
     ambient  (t, 9) float32 or None: exitance at each corner, see ``ambient_field``
     """
 
     def __init__(self, scene: TracedScene, bodies: Mapping[int, FastBody]):
         count = len(scene.triangle_plane)
-        self.rows = np.zeros((count, 16), np.float32)
-        corners = self.rows[:, :12].reshape(count, 3, 4)
-        corners[:, :, :3] = scene.corner_normals()
-        for body in bodies.values():
-            if body.curvature is not None:
-                first = body.thing.first_triangle
-                corners[first : first + len(body.curvature), :, 3] = body.curvature
+        self.rows = np.zeros((count, 8), np.float32)
+        self.rows[:, :3] = scene.triangle_normal.T
+        self.rows[:, 3] = scene.triangle_plane
+        self.normals = None if scene.faceted else np.ascontiguousarray(scene.corner_normals().reshape(-1, 9))
         self.ambient = None
         if any(body.ambient is not None for body in bodies.values()):
             self.ambient = np.full((count, 9), np.nan, np.float32)
-            for body in bodies.values():
-                if body.ambient is not None:
-                    first = body.thing.first_triangle
-                    self.ambient[first : first + len(body.ambient)] = body.ambient.reshape(-1, 9)
-        self.rows[:, 12:15] = scene.triangle_normal.T
-        self.rows[:, 15] = scene.triangle_plane
+        for body in bodies.values():
+            first = body.thing.first_triangle
+            if body.curvature is not None:
+                self.rows[first : first + len(body.curvature), 4:7] = body.curvature
+            if self.ambient is not None and body.ambient is not None:
+                self.ambient[first : first + len(body.ambient)] = body.ambient.reshape(-1, 9)
 
     def at(self, rays: Meeting) -> Met:
         """The points where they do."""
         columns = np.ascontiguousarray(self.rows.take(rays.triangle, axis=0).T)
-        flat, plane = columns[12:15], columns[15]
+        flat, plane = columns[:3], columns[3]
+        weights = 1 - rays.u - rays.v, rays.u, rays.v
         position = rays.direction * rays.distance
         position += rays.origin
         # back onto the plane, see ``TracedScene.on_plane``
         height = _dot(flat, position)
         height -= plane
         position -= height * flat
-        mixed = columns[0:4]
-        mixed *= 1 - rays.u - rays.v
-        mixed += rays.u * columns[4:8]
-        mixed += rays.v * columns[8:12]
-        normal = mixed[:3]
-        length = np.sqrt(_dot(normal, normal))
-        nothing = np.flatnonzero(length < np.float32(1e-6))
-        if len(nothing):
-            normal[:, nothing], length[nothing] = flat[:, nothing], 1
-        side = np.copysign(np.float32(1), -_dot(rays.direction, flat))
-        normal *= side / length
+        cosine = _dot(rays.direction, flat)
+        side = -np.copysign(np.float32(1), cosine)
+        normal = flat
+        if self.normals is not None:
+            normal = _mixed(self.normals, rays.triangle, weights)
+            length = np.sqrt(_dot(normal, normal))
+            nothing = np.flatnonzero(length < np.float32(1e-6))
+            if len(nothing):
+                normal[:, nothing], length[nothing] = flat[:, nothing], 1
+            normal *= side / length
+            cosine = _dot(rays.direction, normal)
         flat *= side
-        cosine = np.clip(-_dot(rays.direction, normal), np.float32(1e-4), 1)
-        ambient = None
-        if self.ambient is not None:
-            columns = np.ascontiguousarray(self.ambient.take(rays.triangle, axis=0).T)
-            ambient = columns[0:3]
-            ambient *= 1 - rays.u - rays.v
-            ambient += rays.u * columns[3:6]
-            ambient += rays.v * columns[6:9]
-        return Met(position, flat, normal, cosine, mixed[3], ambient)
+        cosine = np.clip(np.abs(cosine) if normal is flat else -cosine, np.float32(1e-4), 1)
+        curvature = _weighted(columns[4:7], weights)
+        ambient = None if self.ambient is None else _mixed(self.ambient, rays.triangle, weights)
+        return Met(position, flat, normal, cosine, curvature, ambient)
+
+
+def _mixed(corners: Float32, triangle: NDArray[np.int32], weights: tuple[Float32, Float32, Float32]) -> Float32:
+    """(3, n) of a table of vectors at the corners, (t, 9)."""
+    columns = np.ascontiguousarray(corners.take(triangle, axis=0).T)
+    return _weighted((columns[0:3], columns[3:6], columns[6:9]), weights)
+
+
+def _weighted(corners, weights: tuple[Float32, Float32, Float32]) -> Float32:
+    """Sum of three arrays with weights; the first one's memory becomes the result."""
+    first, second, third = corners
+    first *= weights[0]
+    first += weights[1] * second
+    first += weights[2] * third
+    return first
 
 
 def _dot(a: Float32, b: Float32) -> Float32:

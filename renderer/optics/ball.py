@@ -123,12 +123,12 @@ class BallTable:
     def exitance(self, x: ArrayLike, radius: ArrayLike) -> Float32:
         """(n,) B(x; R)/E0 at cosines ``x`` (n,) and radii (n,) in transport mean free paths."""
         rows = lookup.rows_at(lookup.octaves(_single(radius)))
-        return lookup.interpolate(self.ball, rows, lookup.columns_at(_single(x)))
+        return lookup.interpolate(self.ball, lookup.places(rows, lookup.columns_at(_single(x))))
 
     def slab_exitance(self, x: ArrayLike, thickness: ArrayLike) -> Float32:
         """(n,) the slab's exitance per irradiance at signed cosines (n,) and thicknesses (n,)."""
         rows = lookup.rows_at(lookup.octaves(_single(thickness) * np.float32(0.5)))
-        return lookup.interpolate(self.slab, rows, lookup.columns_at(_single(x)))
+        return lookup.interpolate(self.slab, lookup.places(rows, lookup.columns_at(_single(x))))
 
     def uniform_exitance(self, radius: ArrayLike) -> Float32:
         """(n,) exitance per radiance of a constant environment."""

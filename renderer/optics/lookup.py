@@ -44,6 +44,26 @@ class Columns:
     share: Float32
 
 
+@dataclass(frozen=True)
+class Places:
+    """Where pairs of both fall in a table.
+
+    corner         (n,) intp the node of the lower row and the lower column, counted along the rows
+    row, column    (n,) shares of the upper row and of the upper column
+    """
+
+    corner: NDArray[np.intp]
+    row: Float32
+    column: Float32
+
+
+def places(rows: Rows, columns: Columns) -> Places:
+    """The pairs of n rows with n columns."""
+    corner = rows.index * _COLUMNS
+    corner += columns.index
+    return Places(corner, rows.share, columns.share)
+
+
 def octaves(radius: Float32) -> Float32:
     """(n,) log2 of positive radii; 0 and infinity stay harmless."""
     return np.log2(np.clip(radius, np.float32(1e-30), np.float32(1e30)))
@@ -69,16 +89,14 @@ def columns_at(cosine: Float32) -> Columns:
     return Columns(index, place)
 
 
-def interpolate(table: Float32, rows: Rows, columns: Columns) -> Float32:
+def interpolate(table: Float32, at: Places) -> Float32:
     """(n,) values of a (48, 201) float32 table between its nodes."""
     flat = table.reshape(-1)
-    corner = rows.index * _COLUMNS
-    corner += columns.index
-    lower = _between(flat, corner, columns.share)
-    corner += _COLUMNS
-    upper = _between(flat, corner, columns.share)
+    lower = _between(flat, at.corner, at.column)
+    # the row above begins a row of nodes on
+    upper = _between(flat[_COLUMNS:], at.corner, at.column)
     upper -= lower
-    upper *= rows.share
+    upper *= at.row
     lower += upper
     return lower
 

@@ -39,7 +39,7 @@ def corner_field(
 
     points     (k, 3) the points of ``mesh.topology`` in the frame
     curvature  (m, 3) at the faces' corners
-    exitance   (3, n) of n points and axes (3, ``AXES``)
+    exitance   (3, n) or, the same for all channels, (1, n) of n points and axes (3, ``AXES``)
     """
     faces = mesh.topology.faces
     normals = point_normals(mesh)

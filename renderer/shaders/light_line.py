@@ -59,7 +59,8 @@ def follow(
     n = origin.shape[1]
     chord, depth = np.zeros(n, np.float32), np.zeros(n, np.float32)
     blocked = np.zeros(n, bool)
-    at = np.arange(n)
+    # all of them, as long as none has ended: a slice is far cheaper to add to
+    at: slice | NDArray[np.intp] = slice(None)
     left = distance * _SHORT_OF_LIGHT
     winding = inside.astype(np.int8)
     first = inside.copy()
@@ -67,51 +68,48 @@ def follow(
     for _ in range(MOST_SURFACES):
         length, triangle = caster.closest(origin, direction, np.minimum(left, np.float32(1e37)))
         hit = triangle >= 0
-        within = winding > 0
         # a stretch that nothing ends, neither surface nor light, has no length
         endless = ~hit & np.isinf(left)
         if endless.any():
-            lost = endless & first
-            chord[at[lost]] = np.nan
             length = np.where(endless, np.float32(0), length)
-        stretch = np.flatnonzero(first)
-        chord[at[stretch]] += length[stretch]
-        stretch = np.flatnonzero(~first & (within | (weight > 0)))
-        depth[at[stretch]] += length[stretch] * np.where(within, np.float32(1), weight)[stretch]
+            chord[at] += np.where(first, np.where(endless, np.float32(np.nan), length), np.float32(0))
+        else:
+            chord[at] += np.where(first, length, np.float32(0))
+        if not chord_only:
+            share = np.where(winding > 0, np.float32(1), weight)
+            depth[at] += np.where(first, np.float32(0), length * share)
 
         go = np.flatnonzero(hit)
         if len(go) == 0:
             break
-        triangle = triangle[go]
+        triangle, heading = triangle.take(go), direction.take(go, axis=1)
         normal = caster.triangle_normal.take(triangle, axis=1)
         owner = caster.triangle_object.take(triangle)
-        heading = direction.take(go, axis=1)
         leaving = np.einsum("ij,ij->j", heading, normal) > 0
         own = owner == body.object_index
-        at, first, winding, weight, length = at[go], first[go], winding[go], weight[go], length[go]
-        left = left[go] - length
-        winding += np.where(own, np.where(leaving, np.int8(-1), np.int8(1)), np.int8(0))
+        at = go if isinstance(at, slice) else at[go]
+        winding = winding[go] + np.where(own, np.where(leaving, np.int8(-1), np.int8(1)), np.int8(0))
         # a line that starts on a face may meet that face once more
         np.maximum(winding, 0, out=winding)
-        other = body.weight_of(owner)
-        weight = np.where(own, weight, np.where(leaving, np.float32(0), other))
-        first &= winding > 0
-        stop = ~own & np.isinf(other)
+        first = first[go] & (winding > 0)
         if chord_only:
-            stop = ~first
+            keep = np.flatnonzero(first)
         else:
+            other = body.weight_of(owner)
+            weight = np.where(own, weight[go], np.where(leaving, np.float32(0), other))
+            stop = ~own & np.isinf(other)
             blocked[at] = stop
-        origin = origin.take(go, axis=1)
-        origin += length * heading
-        # on to the far side of the face
-        origin += normal * np.where(leaving, RAY_OFFSET, -RAY_OFFSET)
-        keep = np.flatnonzero(~stop)
+            keep = np.flatnonzero(~stop)
+            weight = weight[keep]
         if len(keep) == 0:
             break
-        if len(keep) < len(go):
-            origin, heading = origin.take(keep, axis=1), heading.take(keep, axis=1)
-            at, first, winding, weight, left = at[keep], first[keep], winding[keep], weight[keep], left[keep]
-        direction = heading
+        go, at, first, winding, leaving = go[keep], at[keep], first[keep], winding[keep], leaving[keep]
+        direction, length = heading.take(keep, axis=1), length[go]
+        left = left[go] - length
+        origin = origin.take(go, axis=1)
+        origin += length * direction
+        # on to the far side of the face
+        origin += normal.take(keep, axis=1) * np.where(leaving, RAY_OFFSET, -RAY_OFFSET)
     else:
-        chord[at[first]] = np.nan
+        chord[np.arange(n)[at][first]] = np.nan
     return LightLine(chord, depth, blocked)

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from sss_tools.rays import RAY_OFFSET
 
+from ..optics.lookup import Places
 from .light_line import LightLine, follow
 from .surface import Beam, BodyOptics, Caster, SurfacePoints, cosine_to, sum_in_blocks
 
@@ -59,14 +60,13 @@ def _shade(caster: Caster, points: SurfacePoints, body: BodyOptics, beam: Beam) 
     chord = towards.chord
     lit = np.flatnonzero(x >= 0)
     if len(lit):
-        some = points.take(lit)
-        chord[lit] = _chord_behind(caster, some, body, -direction.take(lit, axis=1))
+        chord[lit] = _chord_behind(caster, _below(points).take(lit, axis=1), body, -direction.take(lit, axis=1))
     radius = ball_radius(body, points.curvature, x, chord)
-    found = solved_body(body, x, radius, points.curvature)
-    body.seen(found, x, radius, points, direction)
+    at = body.places(x, radius)
+    found = solved_body(body, x, radius, points.curvature, at)
+    body.seen(found, x, radius, points, direction, at)
     found *= _arriving(towards, x, body)
-    found *= irradiance
-    return found
+    return found * irradiance
 
 
 def _towards(caster, points: SurfacePoints, body: BodyOptics, direction, distance, x) -> LightLine:
@@ -76,16 +76,20 @@ def _towards(caster, points: SurfacePoints, body: BodyOptics, direction, distanc
     return follow(caster, body, origin, direction, distance, dark)
 
 
-def _chord_behind(caster, points: SurfacePoints, body: BodyOptics, inward) -> Float32:
+def _below(points: SurfacePoints) -> Float32:
+    """(3, n) the points, off their faces into the body."""
+    return points.position - points.normal * RAY_OFFSET
+
+
+def _chord_behind(caster, origin: Float32, body: BodyOptics, inward: Float32) -> Float32:
     """(n,) length of the first stretch inside along ``inward``, which points into the body."""
-    n = len(points)
-    origin = points.position - points.normal * RAY_OFFSET
+    n = origin.shape[1]
     everywhere = np.full(n, np.inf, np.float32)
     return follow(caster, body, origin, inward, everywhere, np.ones(n, bool), chord_only=True).chord
 
 
 def _arriving(line: LightLine, x: Float32, body: BodyOptics) -> Float32:
-    """(3, n) or (1, n) share of the beam left by what stands before the body.
+    """(channels, n) or (1, n) share of the beam left by what stands before the body.
 
     Opaque things let nothing through. Translucent ones, folds of the same body among them, add their depth to
     the way already inside, which begins at nothing on either side of the terminator. A quarter of a transport mean
@@ -97,7 +101,7 @@ def _arriving(line: LightLine, x: Float32, body: BodyOptics) -> Float32:
     behind = np.flatnonzero((depth > 0) & ~line.blocked)
     if len(behind) == 0:
         return left
-    left = np.repeat(left, 3, axis=0)
+    left = np.repeat(left, body.channels, axis=0)
     before = np.where(x[behind] < 0, np.nan_to_num(line.chord[behind]), np.float32(0))
     left[:, behind] = body.passed_on(before, depth[behind])
     return left
@@ -119,8 +123,10 @@ def ball_radius(body: BodyOptics, curvature: Float32, x: Float32, chord: Float32
     return np.multiply(radius, np.power(from_chord / radius, share), dtype=np.float32)
 
 
-def solved_body(body: BodyOptics, x: Float32, radius: Float32, curvature: Float32) -> Float32:
-    """(3, n) exitance per irradiance: the ball's, bent towards the slab's where the surface is flatter than the ball.
+def solved_body(
+    body: BodyOptics, x: Float32, radius: Float32, curvature: Float32, at: list[Places] | None = None
+) -> Float32:
+    """(channels, n) exitance per irradiance: the ball's, bent towards the slab's where the surface is flatter than it.
 
         B + w (S - B) for w = (1 - R_e H) x^2 > 0,   B (S/B)^w, R_e H at most 2, else
 
@@ -128,8 +134,10 @@ def solved_body(body: BodyOptics, x: Float32, radius: Float32, curvature: Float3
     the slab, and what is rounder than the ball is as far from the slab on the other side, but between the ball of the
     chord and that of the curvature: a thick slab is so dark that nothing is as far from it. x^2 fades the slab out
     towards the terminator, where its thickness and its light tend to nothing.
+
+    at  the places of x and radius in the tables, where they are known
     """
-    ball = body.ball_exitance(x, radius)
+    ball = body.ball_exitance(x, radius, at)
     square = x * x
     slab = body.slab_exitance(x, 2 * radius * square)
     weight = 1 - np.clip(radius * curvature, 0, 2)
@@ -150,7 +158,7 @@ def solved_body(body: BodyOptics, x: Float32, radius: Float32, curvature: Float3
 
 
 def ambient(caster: Caster, points: SurfacePoints, body: BodyOptics, axes: Float32) -> Float32:
-    """(3, n) exitance under radiance 1 from everywhere.
+    """(channels, n) exitance under radiance 1 from everywhere.
 
     A few directions k tell how the body differs from one ball and what stands before it; what the ball itself
     would send out is known exactly,
@@ -164,12 +172,12 @@ def ambient(caster: Caster, points: SurfacePoints, body: BodyOptics, axes: Float
     axes  (3, k) unit columns
     """
     n = len(points)
-    found, cosines, radii = np.zeros((3, n), np.float32), [], []
+    found, cosines, radii = np.zeros((body.channels, n), np.float32), [], []
     for axis in axes.T:
         x = np.einsum("i,ij->j", axis, points.normal)
         outward = axis[:, None] * np.where(x < 0, np.float32(-1), np.float32(1))
         np.abs(x, out=x)
-        chord = _chord_behind(caster, points, body, -outward)
+        chord = _chord_behind(caster, _below(points), body, -outward)
         radius = ball_radius(body, points.curvature, x, chord)
         near = solved_body(body, x, radius, points.curvature)
         far = solved_body(body, -x, radius, points.curvature)
@@ -184,7 +192,7 @@ def ambient(caster: Caster, points: SurfacePoints, body: BodyOptics, axes: Float
         radii.append(radius)
     # the one ball is the mean of the fitted ones, in the logarithm
     common = np.exp(np.mean(np.log(radii), axis=0, dtype=np.float32))
-    plain = np.full((3, n), 1e-12, np.float32)
+    plain = np.full((body.channels, n), 1e-12, np.float32)
     for x in cosines:
         plain += body.ball_exitance(x, common)
         plain += body.ball_exitance(-x, common)
@@ -194,7 +202,7 @@ def ambient(caster: Caster, points: SurfacePoints, body: BodyOptics, axes: Float
 
 
 def _beyond(caster, points: SurfacePoints, body: BodyOptics, inward, chord) -> Float32:
-    """(3, n) or (1, n) share of the light from ``inward`` that reaches the far end of the chords."""
+    """(channels, n) or (1, n) share of the light from ``inward`` that reaches the far end of the chords."""
     origin = points.position + (chord + 4 * RAY_OFFSET) * inward
     outside = np.zeros(len(points), bool)
     line = follow(caster, body, origin, inward, np.full(len(points), np.inf, np.float32), outside)

@@ -36,10 +36,10 @@ def _shade(caster: Caster, points: SurfacePoints, body: BodyOptics, beam: Beam) 
     direction, distance, irradiance = beam.at(points.position)
     x = cosine_to(points.normal, direction)
     arriving = _arriving(caster, points, body, direction, distance, x, radius)
-    found = body.ball_exitance(x, radius)
-    body.seen(found, x, radius, points, direction)
-    found *= arriving * irradiance
-    return found
+    at = body.places(x, radius)
+    found = body.ball_exitance(x, radius, at)
+    body.seen(found, x, radius, points, direction, at)
+    return found * (arriving * irradiance)
 
 
 def _arriving(caster, points: SurfacePoints, body: BodyOptics, direction, distance, x, radius) -> Float32:

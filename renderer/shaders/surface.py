@@ -151,10 +151,15 @@ class BodyOptics:
         return cls(object_index, medium, float(bounding_radius), weights)
 
     @cached_property
-    def tables(self) -> tuple[BallTable, BallTable, BallTable]:
+    def channels(self) -> int:
+        """How many differ, and rows that lookups return: 3, or 1 in a grey medium, where one stands for all."""
+        values = np.stack([self.medium.reduced_albedo, self.transport_length])
+        return 1 if (values == values[:, :1]).all() else 3
+
+    @cached_property
+    def tables(self) -> list[BallTable]:
         """Ball and slab of each channel."""
-        red, green, blue = (ball_table(float(a), self.ior) for a in self.medium.reduced_albedo)
-        return red, green, blue
+        return [ball_table(float(a), self.ior) for a in self.medium.reduced_albedo[: self.channels]]
 
     @property
     def ior(self) -> float:
@@ -179,31 +184,46 @@ class BodyOptics:
     def rows(self, radius: Float32) -> list[lookup.Rows]:
         """Table rows of each channel for radii (n,) in the frame; the same object where channels agree."""
         octaves = lookup.octaves(radius)
-        lengths = self.transport_length
+        lengths = self.transport_length[: self.channels]
         first = lookup.rows_at(octaves - np.log2(lengths[0]))
-        return [
-            first if channel == 0 or lengths[channel] == lengths[0] else lookup.rows_at(octaves - np.log2(length))
-            for channel, length in enumerate(lengths)
-        ]
+        return [first if length == lengths[0] else lookup.rows_at(octaves - np.log2(length)) for length in lengths]
 
-    def ball_exitance(self, x: Float32, radius: Float32) -> Float32:
-        """(3, n) B(x; R)/E0 at cosines (n,) and radii (n,) in the frame."""
+    def places(self, x: Float32, radius: Float32) -> list[lookup.Places]:
+        """Where balls stand in the tables of each channel: cosines (n,) and radii (n,) in the frame."""
         columns = lookup.columns_at(x)
         rows = self.rows(radius)
-        return np.stack([lookup.interpolate(t.ball, r, columns) for t, r in zip(self.tables, rows, strict=True)])
+        first = lookup.places(rows[0], columns)
+        return [first if each is rows[0] else lookup.places(each, columns) for each in rows]
+
+    def ball_exitance(self, x: Float32, radius: Float32, at: list[lookup.Places] | None = None) -> Float32:
+        """(channels, n) B(x; R)/E0 at cosines (n,) and radii (n,) in the frame.
+
+        at  the ``places`` of both, where they are known
+        """
+        at = at or self.places(x, radius)
+        return np.stack([lookup.interpolate(t.ball, place) for t, place in zip(self.tables, at, strict=True)])
 
     @cached_property
-    def emergence(self) -> tuple[EmergenceTable, EmergenceTable, EmergenceTable]:
+    def emergence(self) -> list[EmergenceTable]:
         """Directions of each channel's light."""
-        red, green, blue = (emergence_table(float(a), self.ior) for a in self.medium.reduced_albedo)
-        return red, green, blue
+        return [emergence_table(float(a), self.ior) for a in self.medium.reduced_albedo[: self.channels]]
 
-    def seen(self, exitance: Float32, x: Float32, radius: Float32, points: SurfacePoints, direction: Float32) -> None:
-        """Turn exitance (3, n) of balls under a beam into what the viewer sees of it, in place.
+    def seen(
+        self,
+        exitance: Float32,
+        x: Float32,
+        radius: Float32,
+        points: SurfacePoints,
+        direction: Float32,
+        at: list[lookup.Places] | None = None,
+    ) -> None:
+        """Turn exitance (channels, n) of balls under a beam into what the viewer sees of it, in place.
 
         That is the exitance of a surface that is as bright from all sides and sends the viewer the same radiance:
         the exitance times the ball's share and directions of light scattered often, plus the ball's light scattered
         once (``optics.emergence``). Nothing is done where nobody views.
+
+        at  the ``places`` of x and radius, where they are known
         """
         if points.viewer is None:
             return
@@ -213,46 +233,44 @@ class BodyOptics:
         to_light = cosine_to(direction, points.viewer) * np.float32(1 / self.ior)
         sideways = to_light - view * np.float32(1 / self.ior) * x
         to_light = sideways + inside * x
-        columns = lookup.columns_at(x)
+        at = at or self.places(x, radius)
         once, length = np.zeros_like(x), np.float32(0)
-        for channel, (table, rows) in enumerate(zip(self.emergence, self.rows(radius), strict=True)):
-            share = lookup.interpolate(table.share, rows, columns)
+        for channel, (table, place) in enumerate(zip(self.emergence, at, strict=True)):
+            share = lookup.interpolate(table.share, place)
             if self.transport_length[channel] != length:
                 length = self.transport_length[channel]
                 paths = np.clip(radius / length, *_RADII)
                 counts = np.flatnonzero(share > _FAINT_SHARE)
                 once = np.zeros_like(x)
-                once[counts] = scattered_once(
-                    x[counts], paths[counts], inside[counts], to_light[counts], self.ior
-                )  # fmt: skip
+                some = (each.take(counts) for each in (x, paths, inside, to_light))
+                once[counts] = scattered_once(*some, self.ior)
             falls = sideways / paths
-            falls *= lookup.interpolate(table.slope, rows, columns)
-            often = np.where(falls > 0, 1 / (1 + np.maximum(falls, 0)), 1 - falls)
+            falls *= lookup.interpolate(table.slope, place)
+            stretched = 1 + np.abs(falls)
+            often = np.where(falls > 0, 1 / stretched, stretched)
             often *= (1 - share) * (np.float32(table.norm) + np.float32(table.norm * table.depth) * inside)
             exitance[channel] *= often
             # not bent with the rest: over a ball that is all but dark it would be anything
             exitance[channel] += np.float32(table.unit * self.medium.reduced_albedo[channel]) * once
 
     def slab_exitance(self, x: Float32, thickness: Float32) -> Float32:
-        """(3, n) exitance of the slab per irradiance, at signed cosines; see ``BallTable.slab``."""
-        columns = lookup.columns_at(x)
-        rows = self.rows(thickness * np.float32(0.5))
-        return np.stack([lookup.interpolate(t.slab, r, columns) for t, r in zip(self.tables, rows, strict=True)])
+        """(channels, n) exitance of the slab per irradiance, at signed cosines; see ``BallTable.slab``."""
+        at = self.places(x, thickness * np.float32(0.5))
+        return np.stack([lookup.interpolate(t.slab, place) for t, place in zip(self.tables, at, strict=True)])
 
     def uniform_exitance(self, radius: Float32) -> Float32:
-        """(3, n) exitance of balls under constant radiance 1."""
+        """(channels, n) exitance of balls under constant radiance 1."""
         rows = self.rows(radius)
         return np.stack([lookup.interpolate_rows(t.uniform, r) for t, r in zip(self.tables, rows, strict=True)])
 
     def passed_on(self, before: Float32, depth: Float32) -> Float32:
-        """(3, n) share of diffuse light left when ``depth`` (n,) is added to a way of ``before`` (n,) inside.
+        """(channels, n) share of diffuse light left when ``depth`` (n,) is added to a way of ``before`` (n,) inside.
 
             sinh k(before + 2 z_b) / sinh k(before + depth + 2 z_b)
 
         the flux through a layer between its extrapolated surfaces: 1/length without absorption, exponential with.
         """
-        k, z_b = (value[:, None] for value in self._diffusion)
-        unit = self.transport_length[:, None]
+        k, z_b, unit = (value[: self.channels, None] for value in (*self._diffusion, self.transport_length))
         near = k * (before / unit + 2 * z_b)
         far = near + k * (depth / unit)
         return np.exp(near - far) * np.expm1(-2 * near) / np.expm1(-2 * far)

@@ -254,6 +254,11 @@ class TracedScene:
             return normal
         return self._smooth.interpolate(self.barycentric(position, triangle), triangle, normal)
 
+    @property
+    def faceted(self) -> bool:
+        """Whether shading normals are those of the triangles, everywhere."""
+        return self._smooth is None
+
     def corner_normals(self) -> Float32:
         """(t, 3, 3) what ``shading_normal`` interpolates: unit normals at the corners of each triangle."""
         flat = np.broadcast_to(self.triangle_normal.T[:, None], (len(self.triangles), 3, 3))

@@ -41,26 +41,29 @@ class RectangleSource:
         radiance times solid angle, has no noise. ``u1`` and ``u2`` are (n,) or numbers in [0, 1). Nothing arrives
         behind the rectangle.
         """
-        return self._sample(position, u1, u2, np.float64)
+        direction, distance, arriving = self._sample(position, u1, u2, np.float64)
+        return Illumination(direction, distance, self.radiance * arriving, inverse(arriving))
 
     def sample_at(self, position: Float32, share: NDArray[np.float64]) -> Illumination:
-        """As ``sample`` with the same two numbers everywhere, in single precision where the light is ``wide``.
+        """As ``sample`` with the same two numbers everywhere, without density; single precision where ``wide``.
 
         The solid angle is then wrong by some 1e-6 steradians, in a fifth of the time.
         """
         kind = np.float32 if self.wide else np.float64
         u1, u2 = share.astype(kind)
-        return self._sample(position, u1, u2, kind)
+        direction, distance, arriving = self._sample(position, u1, u2, kind)
+        return Illumination(direction, distance, self.radiance * arriving)
 
-    def _sample(self, position: Float32, u1, u2, kind: type[np.floating]) -> Illumination:
+    def _sample(self, position: Float32, u1, u2, kind: type[np.floating]) -> tuple[Float32, Float32, Float32]:
+        """Direction (3, n), distance (n,), and the solid angle (n,) from which light comes."""
         axes, half = self._axes.astype(kind), self._half.astype(kind)
         local = axes @ (position - self._center.astype(kind))
         point, solid_angle = spherical_rectangle(local, half, u1, u2)
         offset = point - local
         distance = np.sqrt(np.einsum("ij,ij->j", offset, offset))
         direction = (axes.T @ offset / np.maximum(distance, kind(1e-20))).astype(np.float32, copy=False)
-        arriving = np.where(local[2] > 0, solid_angle, 0).astype(np.float32)
-        return Illumination(direction, distance.astype(np.float32), self.radiance * arriving, inverse(arriving))
+        arriving = np.where(local[2] > 0, solid_angle, 0).astype(np.float32, copy=False)
+        return direction, distance.astype(np.float32, copy=False), arriving
 
     def density(self, position: Float32) -> Float32:
         """(n,) density per steradian with which ``sample`` draws directions from ``position`` (3, n); 0 behind."""

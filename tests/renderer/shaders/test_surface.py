@@ -1,8 +1,12 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from renderer.shaders import plumb, scalar
 from renderer.shaders.surface import BodyOptics, outgoing_radiance
 from sss_tools.medium import Medium
+from sss_tools.shapes import icosphere
 
 
 def test_radiance_integrates_to_the_exitance():
@@ -52,3 +56,24 @@ def test_radii_scale_with_the_medium(scale):
     plain = BodyOptics.prepare(0, medium, 1.0).ball_exitance(x, radius)
     scaled = BodyOptics.prepare(0, medium.scaled(scale), 1.0).ball_exitance(x, radius / np.float32(scale))
     np.testing.assert_allclose(scaled, plain, rtol=1e-3)
+
+
+@pytest.mark.parametrize("shader", [plumb, scalar])
+def test_a_grey_mediums_one_channel_is_what_each_of_three_would_be(stage, shader):
+    ball = icosphere(0.5, 2)
+    points = stage.vertex_points(ball, 2.0)
+    view = np.repeat(np.array([[0.0], [0.6], [0.8]], np.float32), len(points), axis=1)
+    points = replace(points, viewer=view)
+    lights = [stage.Directional([0.3, 0.5, 0.8], (1, 2, 3)), stage.Ambient([2, 1, 0.5])]
+    medium = Medium.from_albedo(0.9, 20.0, ior=1.5)
+    grey, coloured = (BodyOptics.prepare(0, medium, 1.0) for _ in range(2))
+    coloured.__dict__["channels"] = 3
+    assert grey.channels == 1
+    found, expected = (shader.exitance(stage.Objects(ball), points, each, lights) for each in (grey, coloured))
+    np.testing.assert_array_equal(found, expected)
+    assert found.min() > 0
+
+
+def test_channels_that_differ_in_any_way_are_three():
+    for albedo, sigma_t in (([0.9, 0.9, 0.8], 10.0), (0.9, [10.0, 10.0, 11.0])):
+        assert BodyOptics.prepare(0, Medium.from_albedo(albedo, sigma_t), 1.0).channels == 3
