@@ -242,8 +242,8 @@ class BodyOptics:
                 paths = np.clip(radius / length, *_RADII)
                 counts = np.flatnonzero(share > _FAINT_SHARE)
                 once = np.zeros_like(x)
-                some = (each.take(counts) for each in (x, paths, inside, to_light))
-                once[counts] = scattered_once(*some, self.ior)
+                cosine, far, leaving, turned = (each.take(counts) for each in (x, paths, inside, to_light))
+                once[counts] = scattered_once(cosine, far, leaving, turned, self.ior)
             falls = sideways / paths
             falls *= lookup.interpolate(table.slope, place)
             stretched = 1 + np.abs(falls)
