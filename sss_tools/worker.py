@@ -129,8 +129,9 @@ class Worker:
         # a fresh interpreter: forking a process with threads or open libraries is what crashes are made of
         context = multiprocessing.get_context("spawn")
         self.pipe, far_end = context.Pipe()
-        self._process = context.Process(target=_serve, args=(far_end, *self._arguments), daemon=True)
-        self._process.start()
+        process = context.Process(target=_serve, args=(far_end, *self._arguments), daemon=True)
+        process.start()
+        self._process = process
         # the worker's end must be open in the worker alone, or its death would not show
         far_end.close()
 

@@ -2,6 +2,7 @@ import os
 import subprocess
 import sys
 import time
+from multiprocessing.context import SpawnProcess
 from pathlib import Path
 
 import pytest
@@ -11,6 +12,7 @@ from sss_tools.batch import Task, check_files, check_tasks, find_meshes
 from sss_tools.errors import InputError
 from sss_tools.validation.outcome import Outcome
 from sss_tools.validation.settings import Settings
+from sss_tools.worker import Worker
 from sss_tools.writing import write_mesh
 
 SABOTAGE = """
@@ -143,6 +145,17 @@ def test_the_time_a_worker_takes_to_start_is_not_the_meshs(tmp_path, sabotage, m
     monkeypatch.setenv("SABOTAGE_START", "7")
     (report,) = check_files(boxes(tmp_path, "a"), Settings(), timeout=6, check=sabotage)
     assert report.status == "ok"
+
+
+def test_a_worker_that_cannot_be_started_says_why_and_can_be_stopped(monkeypatch):
+    def no_process(self):
+        raise OSError("no more processes")
+
+    monkeypatch.setattr(SpawnProcess, "start", no_process)
+    worker = Worker()
+    with pytest.raises(OSError, match="no more processes"):
+        worker.give(Task("ball.ply", Settings()))
+    worker.stop()
 
 
 def test_the_reports_of_many_meshes_wait_on_disk(tmp_path):
