@@ -19,6 +19,8 @@ from local_cluster import LocalCluster
 NOT_KNOWN = float("nan")
 LOOK_EVERY = 0.005
 """Seconds between looks at how many passes there are."""
+TRIES = 4
+"""Trials made, at most, for each one that counts."""
 
 
 def worker_killed(work: Work, count: int, chance: random.Random) -> Trials:
@@ -47,9 +49,14 @@ def worker_killed(work: Work, count: int, chance: random.Random) -> Trials:
 
 
 def scheduler_killed(work: Work, count: int, chance: random.Random) -> Trials:
-    """The command says so in one line and keeps what is done; a second run goes on without a cluster."""
+    """The command says so in one line and keeps what is done; a second run goes on without a cluster.
+
+    Where everything was back before the kill the picture must be right, and the trial is made again.
+    """
     trials = Trials("kill -9 of the scheduler")
-    for _ in range(count):
+    for _ in range(TRIES * count):
+        if trials.count == count:
+            break
         with tempfile.TemporaryDirectory(dir=work.folder) as name, LocalCluster(Path(name), 2) as cluster:
             _wait_for_workers(cluster)
             out = Path(name, "out.npz")
@@ -58,6 +65,9 @@ def scheduler_killed(work: Work, count: int, chance: random.Random) -> Trials:
             before, finished = running.seconds(), running.finished
             cluster.scheduler.send_signal(signal.SIGKILL)
             ended = running.end()
+            if ended.status == 0:
+                trials.wrong += work.wrong_pixels(out, tolerance=0)
+                continue
             trials.count += 1
             trials.ending.append((ended.seconds[0] - before[0], ended.seconds[1] - before[1]))
             if ended.status != 2 or ended.said.count("\n") != 1 or "--resume" not in ended.said:
