@@ -67,10 +67,13 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, nargs="+", default=[1])
     parser.add_argument("--meshes", type=Path, help="folder with further meshes, of which it takes those it knows")
     parser.add_argument("--threads", type=int, default=2)
+    parser.add_argument("--seconds", type=float, default=0.5, help="of CPU for each half of path's pictures")
     parser.add_argument("--dry", action="store_true")
     options = parser.parse_args()
     cases = []
-    drawn = (measured_cases(seed, options.cases, options.meshes, options.threads) for seed in options.seeds)
+    drawn = (
+        measured_cases(seed, options.cases, options.meshes, options.threads, options.seconds) for seed in options.seeds
+    )
     for case in chain.from_iterable(drawn):
         cases.append(case)
         errors = ", ".join(f"{name} {100 * error.error:.2g} %" for name, error in case.measured.errors.items())

@@ -32,14 +32,17 @@ QUALITIES = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.8)
 def main() -> None:
     """The command."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--cases", type=int, default=200, help="of each seed")
-    parser.add_argument("--seeds", type=int, nargs="+", default=[2])
+    parser.add_argument("--cases", type=int, default=106, help="of each seed")
+    parser.add_argument("--seeds", type=int, nargs="+", default=[11, 12])
     parser.add_argument("--folds", type=int, default=0, help="0: judge the stored fit")
     parser.add_argument("--meshes", type=Path, help="folder with further meshes, of which it takes those it knows")
     parser.add_argument("--threads", type=int, default=2)
+    parser.add_argument("--seconds", type=float, default=0.5, help="of CPU for each half of path's pictures")
     parser.add_argument("-o", "--output", type=Path, default=Path("docs"))
     options = parser.parse_args()
-    drawn = (measured_cases(seed, options.cases, options.meshes, options.threads) for seed in options.seeds)
+    drawn = (
+        measured_cases(seed, options.cases, options.meshes, options.threads, options.seconds) for seed in options.seeds
+    )
     cases = list(chain.from_iterable(drawn))
     figures = judged(cases, folded(cases, options.folds) if options.folds else [fits()] * len(cases))
     figures["how"] = (

@@ -41,10 +41,10 @@ from sss_tools.mesh import Mesh
 MESHES = ("spot.obj", "rocker-arm.obj", "fandisk.obj", "homer.obj", "7_8ths_cube.stl", "suzanne.obj")
 STORE = Path("out/prediction")
 LARGEST = 40  # pixels
-SECONDS = 1.0
-"""CPU seconds that each half of the path shader's picture takes, about; errors below some 2 % are noise."""
-ROUNDS = (2, 4, 8, 16)
+ROUNDS = (2, 4, 8, 16, 32, 64, 128, 256)
 """Passes after which the noise is measured, as a render does."""
+ENOUGH = 3
+"""Rounds that tell how long more passes take; the first has to build much."""
 
 
 @dataclass(frozen=True)
@@ -61,8 +61,11 @@ class Case:
     seen: tuple[tuple[int, Error], ...]
 
 
-def measured_cases(seed: int, count: int, meshes: Path | None, threads: int) -> Iterator[Case]:
-    """``count`` cases of a seed, from ``STORE`` (JSON lines) as far as they were measured before."""
+def measured_cases(seed: int, count: int, meshes: Path | None, threads: int, seconds: float) -> Iterator[Case]:
+    """``count`` cases of a seed, from ``STORE`` (JSON lines) as far as they were measured before.
+
+    seconds  of CPU that each half of the path shader's picture takes, about, and the passes that tell the noise
+    """
     known, store = {}, STORE / f"cases_{seed}.jsonl"
     if store.exists():
         for line in store.read_text().splitlines():
@@ -70,7 +73,7 @@ def measured_cases(seed: int, count: int, meshes: Path | None, threads: int) -> 
             known[stored["number"]] = stored
     for number in range(count):
         if number not in known:
-            known[number] = _measure(seed, number, meshes, threads)
+            known[number] = _measure(seed, number, meshes, threads, seconds)
             store.parent.mkdir(parents=True, exist_ok=True)
             with store.open("a") as file:
                 file.write(json.dumps(known[number]) + "\n")
@@ -94,15 +97,15 @@ def _case(stored: dict, seed: int, meshes: Path | None) -> Case:
     return Case(stored["number"], stored["name"], look, Measured(errors, Error(*stored["noise"])), seen)
 
 
-def _measure(seed: int, number: int, meshes: Path | None, threads: int) -> dict:
+def _measure(seed: int, number: int, meshes: Path | None, threads: int, seconds: float) -> dict:
     name, scene = checked_scene(seed, number, meshes)
     thing = scene.objects[0]
     nothing = {"number": number, "name": name}
     if thing.closedness is None or thing.closedness.hole_handling == "surface":
         return nothing
     settings = Settings(seed=number, threads=threads)
-    seen, each = _seen(scene, replace(settings, seed=number + 1))
-    passes = float(np.clip(SECONDS / each, 0.25, 64))
+    seen, samples = _seen(scene, replace(settings, seed=number + 1), seconds)
+    passes = float(np.clip(samples / SIDE**2, 0.25, 64))
     found = pilot(scene, 0, settings, passes)
     if found is None or not seen:
         return nothing
@@ -115,24 +118,26 @@ def _measure(seed: int, number: int, meshes: Path | None, threads: int) -> dict:
     }
 
 
-def _seen(scene: Scene, settings: Settings) -> tuple[list[tuple[int, Error]], float]:
-    """The noise of a sample as the first passes show it, and the CPU seconds of a pass of 64 x 64 pixels that the
-    object fills as a pilot's."""
+def _seen(scene: Scene, settings: Settings, seconds: float) -> tuple[list[tuple[int, Error]], float]:
+    """The noise of a sample as the first passes show it, and how many camera samples on the object take so many CPU
+    seconds at once: the last paths of a run walk alone, however many there were."""
     things = (replace(scene.objects[0], shader="path"),)
     renderer = Renderer(replace(scene, objects=things, hash=""), settings, ROUNDS[-1])
     where = renderer.object_id == 0
     found: list[tuple[int, Error]] = []
-    each, begun = 0.0, time.process_time()
+    counts, taken = [0], [0.0]
     for first, last in zip((0, *ROUNDS), ROUNDS, strict=False):
+        begun = time.process_time()
         renderer.run(range(first, last))
+        counts.append((last - first) * max(int(where.sum()), 1))
+        taken.append(time.process_time() - begun)
         noise = noise_seen(renderer.film, where)
         if noise is not None:
             found.append((last, noise))
-        taken = time.process_time() - begun
-        each = taken / last / max(int(where.sum()), 1) * SIDE**2 / 2
-        if taken > SECONDS:
+        if sum(taken) > (seconds if len(taken) > ENOUGH else 4 * seconds):
             break
-    return found, each
+    each = max((taken[-1] - taken[-2]) / max(counts[-1] - counts[-2], 1), 0.1 * taken[-1] / counts[-1])
+    return found, max(seconds - taken[-1], 0.0) / each + counts[-1] * min(4 * seconds / taken[-1], 1.0)
 
 
 def _solid(rng, meshes: Path | None) -> tuple[str, Mesh]:
