@@ -24,7 +24,7 @@ from benchmarks.calibrate_prediction import anchors, fitted
 from benchmarks.prediction_cases import Case, measured_cases
 from renderer.enough import FIRST, next_round
 from renderer.shaders.prediction import SURE, Error, Fit, fits, parsed, predicted_errors, predicted_noise
-from renderer.shaders.selection import CHEAPEST_FIRST, Demand, noise_allowed, passes_within, shares_of
+from renderer.shaders.selection import CHEAPEST_FIRST, MOST_PASSES, Demand, noise_allowed, passes_within, shares_of
 
 QUALITIES = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.8)
 
@@ -66,6 +66,7 @@ class Judged:
     planned, measured    the error predicted before the render, and measured
     told                 the error predicted in the end: for path that which its own passes tell
     consistent           whether a factor of 2 of ``told`` holds what is measured, to a standard error
+    limited              whether path needs so many passes that their limit keeps it above its tolerance
     """
 
     shader: str
@@ -76,6 +77,7 @@ class Judged:
     told: float
     measured: float
     consistent: bool
+    limited: bool
 
 
 def folded(cases: list[Case], folds: int) -> list[dict[str, Fit]]:
@@ -103,6 +105,7 @@ def judged(cases: list[Case], by: list[dict[str, Fit]]) -> dict:
         "cases": len(cases),
         "qualities": QUALITIES,
         "left_out": len(every) - len(choices),
+        "over_by_the_limit_of_passes": sum(one.limited and not one.within for one in choices),
         "chosen": {kind: _shares(found) for kind, found in kinds.items()},
         "predicted_within_factor_2": {name: _factor_2(found) for name, found in ratios.items()},
         "median_measured_over_predicted": {name: float(np.median(found)) for name, found in ratios.items()},
@@ -141,7 +144,7 @@ def _chosen(case: Case, by: dict[str, Fit], quality: float) -> Judged:
     low, high = (max(squared + sign * doubt, 0.0) ** 0.5 for sign in (-1, 1))
     return Judged(
         shader, squared <= allowed**2, low <= allowed, squared - SURE * doubt > allowed**2, before, after, found,
-        low <= 2 * after and high >= after / 2,
+        low <= 2 * after and high >= after / 2, shader == "path" and (seen.error / allowed) ** 2 > MOST_PASSES / 2,
     )  # fmt: skip
 
 
@@ -190,7 +193,8 @@ bias but not without doubt: *to its doubt* counts what is within to a standard e
 what is above by more than 1.6. Is the predicted error within a factor of 2 of the measured? *Planned* is before the
 render; *told* is what is known in the end, of path that which the noise of its own first passes tells.
 {figures["left_out"]} choices of path are left out, in cases so slow that not even the passes of a first round were made
-to tell their noise.
+to tell their noise. {figures["over_by_the_limit_of_passes"]} choices of path are not within because a quality gives
+{MOST_PASSES} passes at most; such a picture tells the error that it has.
 
 | chosen | choices | within | to its doubt | surely over | factor 2, planned | factor 2, told | told, to its doubt |
 |---|---:|---:|---:|---:|---:|---:|---:|
