@@ -55,7 +55,7 @@ SURE = 2.0
 """Standard errors of a difference."""
 CLOCK = 0.1
 """Relative differences of CPU seconds that say nothing."""
-SHORT, REPEATS = 1.0, 5
+SHORT, REPEATS = 1.0, 50
 """CPU seconds below which renders are repeated, as often."""
 
 
