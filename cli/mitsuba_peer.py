@@ -19,9 +19,11 @@ from .clock import process_start
 
 LANES = 2**20
 """Samples of one call: enough to keep wide kernels busy, not more than fit in memory."""
-ROULETTE_DEPTH = 64
-"""From where on paths end by chance. Mitsuba's default, 5, lets weights grow in dense bright media until one sample in
-very many carries much of the light, and pictures look noiseless and too dark before it comes."""
+ROULETTE_DEPTH = 10_000
+"""From where on paths end by chance: hardly ever. Mitsuba's default, 5, and 64 still, let weights grow in dense bright
+media until one sample in very many carries much of the light: pictures look noiseless and too dark before it comes, and
+are worse than they were when it does. Without, the paired runs of ``benchmarks/against_mitsuba.py`` find it quickest on
+most scenes, and little slower on the others."""
 
 
 def main(argv: Sequence[str] | None = None) -> int:
