@@ -16,7 +16,7 @@ from sss_tools.errors import InputError
 from sss_tools.memory import limited_memory, share_of_memory
 
 from .clock import process_start
-from .command import ArgumentParser, complain, progress, run, version
+from .command import EXIT_INTERRUPTED, ArgumentParser, complain, progress, run, version
 from .explanation import plan_at_length, plan_in_a_line
 
 if TYPE_CHECKING:
@@ -39,8 +39,12 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 def main(argv: Sequence[str] | None = None) -> int:
     """The command. Returns the exit status: 0 written, 2 refused, 130 interrupted with what was done written."""
-    with _ended_like_ctrl_c():
-        return run(PROGRAM, _render, argv)
+    try:
+        with _ended_like_ctrl_c():
+            return run(PROGRAM, _render, argv)
+    except KeyboardInterrupt:  # in the moments before ``run`` is ready for it, and after
+        complain(PROGRAM, "interrupted")
+        return EXIT_INTERRUPTED
 
 
 @contextmanager
