@@ -26,7 +26,7 @@ ROOT = Path(__file__).parents[1]
 def test_no_fault_spoils_a_pixel_or_a_file_and_what_was_finished_is_kept():
     done = subprocess.run(
         [sys.executable, str(ROOT / "benchmarks/faults.py"), "--count", "3", "--refresh", "0.05", "--json",
-         "--cluster-passes", "240"],
+         "--cluster-passes", "0"],
         capture_output=True,
         text=True,
         timeout=1800,
@@ -40,7 +40,8 @@ def test_no_fault_spoils_a_pixel_or_a_file_and_what_was_finished_is_kept():
     # an interrupt loses nothing that was finished, nor does a full disk
     for name in ("SIGINT", "SIGTERM", "full disk", "disk that becomes read-only"):
         assert max(results[name]["lost"]) == 0, name
-    assert results["kill -9"]["count"] == 3 and results["kill -9 of the scheduler"]["count"] == 2
+    # those of a cluster are in tests/renderer/test_cluster.py
+    assert results["kill -9"]["count"] == 3
 
 
 def full(path, picture):
