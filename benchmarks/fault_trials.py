@@ -15,6 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
+from renderer.checkpoint import checkpoint_path
 from sss_tools import shapes
 from sss_tools.writing import ply_bytes
 
@@ -231,9 +232,9 @@ def passes_in(path: Path) -> int:
 
 def recover(work: Work, trials: Trials, out: Path, finished: int) -> None:
     """Resume, or begin again where nothing was kept, and judge the picture."""
-    checkpoint = out.with_name(f"{out.name}.unfinished.npz")
+    unfinished = checkpoint_path(out)
     kept = 0
-    for path in (checkpoint, out):
+    for path in (unfinished, out):
         if path.exists():
             try:
                 kept = max(kept, passes_in(path))
@@ -246,5 +247,5 @@ def recover(work: Work, trials: Trials, out: Path, finished: int) -> None:
         trials.broken.append(f"second run: status {ended.status}: {ended.said}")
     else:
         trials.wrong += work.wrong_pixels(out)
-    if checkpoint.exists():
+    if unfinished.exists():
         trials.broken.append("the checkpoint stays")
