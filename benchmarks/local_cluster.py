@@ -22,7 +22,7 @@ ADVISED = {
     "DASK_DISTRIBUTED__WORKER__PROFILE__ENABLED": "False",
 }
 """Dask's settings as docs/scaling.md advises them. With its own, a scheduler keeps the last 1000 messages to each
-worker, among them every scene of less than a megabyte, and sampling what workers do takes a seventh of their time."""
+worker, among them every scene of less than a megabyte, and sampling what workers do takes them time."""
 
 
 class LocalCluster:
