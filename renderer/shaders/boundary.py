@@ -13,6 +13,7 @@ from ..tracing.traced_scene import TracedScene, offset_from
 from ..tracing.transport import Transport
 from .blend import Choices
 from .crossings import Crossings
+from .direct_light import arriving, arriving_from_areas
 from .local_frame import LocalFrame
 from .lost_paths import lose
 from .point_light import light_rough, turned_density
@@ -171,7 +172,7 @@ def _scatter_rough(
     if scene.lights.points or scene.lights.sampled:
         # of a path that was split, one branch speaks for both
         speaks = np.flatnonzero(paths.branch[at.index] != REFLECTS)
-        light_rough(transport, at.take(speaks), frame.take(speaks), view[:, speaks])
+        _light(transport, at.take(speaks), frame.take(speaks), view[:, speaks])
     facet = sample_visible_facet(view, alpha, u1, u2)
     share = _reflected_share(scene, at.slot)
     turned, reflected = _turn(-view, facet, at.eta, choice, paths, at.index, share)
@@ -186,6 +187,19 @@ def _scatter_rough(
         straight = scene.media.ior[np.where(reflected, at.before, at.beyond)] == 1
         np.copyto(density, drawn, where=straight & (drawn > 0))
     return frame.to_world(turned), reflected, density
+
+
+def _light(transport: Transport, at: Crossings, frame: LocalFrame, view: Float32) -> None:
+    """Connect lights to rough boundary points, but for those that the paths' last collisions were connected to."""
+    scene, paths = transport.scene, transport.paths
+    lit = np.array([*(lit.rough for lit in scene.lit_collisions), False])
+    before = lit[at.before] & ~paths.flies_on[at.index]
+    for some, lights in ((~before, arriving), (before, arriving_from_areas)):
+        which = np.flatnonzero(some)
+        if len(which):
+            here = at.take(which)
+            beams = lights(transport, here.index, here.position, skies=True)
+            light_rough(transport, here, frame.take(which), view[:, which], beams)
 
 
 def _keep_side(turned: Float32, near_normal: Float32, reflected: NDArray[np.bool_]) -> NDArray[np.intp]:

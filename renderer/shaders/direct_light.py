@@ -42,9 +42,16 @@ def arriving(
 ) -> Iterator[Illumination]:
     """One beam from each light to the paths ``index`` at ``position`` (3, n): all of a point light, a random part of
     the others; with ``skies`` environments that are worth it are sampled too."""
-    lights = transport.scene.lights
-    for source in lights.points:
+    for source in transport.scene.lights.points:
         yield source.illuminate(position)
+    yield from arriving_from_areas(transport, index, position, skies)
+
+
+def arriving_from_areas(
+    transport: Transport, index: NDArray[np.intp], position: Float32, skies: bool
+) -> Iterator[Illumination]:
+    """As ``arriving``, without the lights that have no extent."""
+    lights = transport.scene.lights
     for sampled in (*lights.rectangles, *lights.spheres, *(lights.skies if skies else ())):
         yield sampled.sample(position, *transport.draw(index))
 

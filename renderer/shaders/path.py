@@ -32,6 +32,7 @@ from ..tracing.transport import Transport
 from .lost_paths import lose
 from .point_light import light_collisions
 from .refracted_light import light_through_facets
+from .rough_light import RoughLight
 
 NAME = "path"
 
@@ -60,6 +61,7 @@ class MediumWalk:
         self._achromatic = bool((self._sigma_t == self._sigma_t[0]).all())
         self._g = media.g[slot]
         self._lights_sampled, self._lit = scene.lights.sampled, scene.lit_collisions[slot]
+        self._rough_light = RoughLight(transport, slot, self._grid) if self._lit.rough else None
         thing = scene.translucent[slot]
         # rounded positions on a flat side of the box are not outside
         self._centre = (thing.lower + thing.upper) / 2
@@ -115,6 +117,8 @@ class MediumWalk:
             light_collisions(self.transport, collided.nonzero()[0], self.slot, self._density)
         if self._lit.facets:
             light_through_facets(self.transport, collided.nonzero()[0], self.slot)
+        if self._rough_light is not None:
+            self._rough_light.light(collided.nonzero()[0])
         play_at_collisions(paths, self._uniforms)
         paths.bury()
 

@@ -2,13 +2,13 @@
 
 Where the boundary is invisible they are connected to collisions, at rough boundaries to the boundary, both without
 bias. Lights without extent, points and parallel beams, no path can meet by chance. The others are found both ways,
-and share (``direct_light.worthwhile``). Behind smooth boundaries lights without extent are connected through the
-facets, see ``refracted_light``, and the others met by chance.
+and share (``direct_light.worthwhile``). Behind rough boundaries lights without extent are connected to collisions, too,
+see ``rough_light``, behind smooth ones through the facets, see ``refracted_light``, and the others met by chance.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from ..optics.free_flight import exponential
 from ..optics.microfacet import turning, unmasked
 from ..optics.phase import henyey_greenstein
+from ..scene.lights import Illumination
 from ..tracing.paths import REFLECTS, REFRACTS, Paths
 from ..tracing.shadow import FREE_DEPTH
 from ..tracing.shadow import transmittance as shadow_transmittance
@@ -67,14 +68,17 @@ def light_collisions(
         transport.add(who, light.irradiance * (weight * visible / (ior * ior)))
 
 
-def light_rough(transport: Transport, at: Crossings, frame: LocalFrame, view: Float32) -> None:
+def light_rough(
+    transport: Transport, at: Crossings, frame: LocalFrame, view: Float32, lights: Iterable[Illumination]
+) -> None:
     """Light rough boundary points by reflection or transmission, whichever side the light is on.
 
+    lights       what arrives from each of some lights
     frame, view  axes around the shading normal on the viewer's side, and the direction back along the path in them
     """
     scene, paths = transport.scene, transport.paths
     alpha = scene.translucent[int(at.slot[0])].roughness
-    for light in arriving(transport, at.index, at.position, skies=True):
+    for light in lights:
         to_light = frame.to_local(light.direction)
         drawn, share = turned_density(paths, at, view, to_light, alpha)
         value = drawn * share * unmasked(to_light[2], alpha)

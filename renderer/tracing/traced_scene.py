@@ -68,11 +68,13 @@ class LitCollisions:
     areas   sky and lights with an extent, where the boundary does not bend rays
     inside  these, and lights without extent that stand in the medium or shine into it unbent
     facets  lights without extent, bent by smooth facets
+    rough   lights without extent, through a rough boundary
     """
 
     areas: bool
     inside: bool
     facets: bool
+    rough: bool
 
 
 class TracedScene:
@@ -169,7 +171,8 @@ class TracedScene:
         unbent = bool(ior == 1)
         areas = unbent and self.lights.sampled
         inside = areas or bool(unbent and self.lights.points) or bool(self.holds_light[:, slot].any())
-        return LitCollisions(areas, inside, any(np.float32(beams.ior) == ior for beams in self.beams))
+        rough = bool(self.lights.points) and not unbent and self.translucent[slot].roughness > 0
+        return LitCollisions(areas, inside, any(np.float32(beams.ior) == ior for beams in self.beams), rough)
 
     def _beams(self, thing: TracedObject, corners, normals, source) -> RefractedBeams:
         first = thing.first_triangle
