@@ -19,6 +19,7 @@ ADVISED = {
     "DASK_DISTRIBUTED__ADMIN__SYSTEM_MONITOR__LOG_LENGTH": "600",
     "DASK_DISTRIBUTED__DIAGNOSTICS__COMPUTATIONS__MAX_HISTORY": "10",
     "DASK_DISTRIBUTED__SCHEDULER__EVENTS_CLEANUP_DELAY": "1 minute",
+    "DASK_DISTRIBUTED__SCHEDULER__PRELOAD": "sss_tools.long_lived_scheduler",
     "DASK_DISTRIBUTED__WORKER__PROFILE__ENABLED": "False",
 }
 """Dask's settings as docs/scaling.md advises them. With its own, a scheduler keeps the last 1000 messages to each

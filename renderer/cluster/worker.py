@@ -18,7 +18,7 @@ from ..output.film import Film
 from ..render import Renderer
 from ..scene.description import Camera
 from ..stages import Stages
-from ..tracing.memory import give_back_memory
+from ..tracing.memory import give_back_memory, keep_pages_small
 from ..tracing.tally import Tally
 from .task import Parcel, Pass, Result, Task, digest, unpacked
 
@@ -87,6 +87,7 @@ def _renderer(parcel: bytes) -> Renderer:
                 _built.popitem(last=False)
             for other in _built.values():
                 other.forget_buffers()
+            keep_pages_small()
             give_back_memory()
             sent: Parcel = pickle.loads(parcel)
             _built[key] = Renderer(sent.scene, sent.settings, sent.passes, measured=sent.measured)

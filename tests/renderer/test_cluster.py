@@ -3,6 +3,7 @@
 import json
 import os
 import pickle
+import re
 import signal
 import subprocess
 import sys
@@ -132,6 +133,20 @@ def test_films_of_a_camera_path_are_those_rendered_here(cluster, shader):
             here.run(range(3))
             np.testing.assert_array_equal(film.sum, here.film.sum)
             np.testing.assert_array_equal(film.hits, here.film.hits)
+
+
+def _status():
+    return Path("/proc/self/status").read_text()
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="Linux tells")
+def test_workers_have_no_huge_pages_once_they_have_rendered(workplace, cluster):
+    render("out.npz", "--passes", 8, "--shader", "path", "--scheduler", cluster.address)
+    with connected(cluster.address) as client:
+        states = [re.search(r"THP_enabled:\s*(\d)", status) for status in client.run(_status).values()]
+    if None in states:
+        pytest.skip("this system does not tell")
+    assert any(state[1] == "0" for state in states)
 
 
 def test_a_worker_keeps_two_scenes_and_the_buffers_of_the_last_alone(monkeypatch):
