@@ -34,6 +34,7 @@ class Paths:
     flies_on    (n,) bool, in media: whether the direction is that of the next flight, and not that before a collision
     branch      (n,) int8 what the path does at the next boundary, see ``WHOLE``
     surfaces    (n,) int16 surfaces met since the last collision
+    steps       (n,) int32 steps in media so far
     alive       (n,) bool
     """
 
@@ -55,6 +56,7 @@ class Paths:
             "flies_on": np.empty(capacity, bool),
             "branch": np.empty(capacity, np.int8),
             "surfaces": np.empty(capacity, np.int16),
+            "steps": np.empty(capacity, np.int32),
             "alive": np.empty(capacity, bool),
         }
         self._rows = [row for array in self._store.values() for row in (array if array.ndim == 2 else (array,))]
@@ -73,7 +75,8 @@ class Paths:
         self.faint, self.stream, self.sample = store["faint"], store["stream"], store["sample"]
         self.triangle, self.inside, self.owner = store["triangle"], store["inside"], store["owner"]
         self.density, self.flown, self.branch = store["density"], store["flown"], store["branch"]
-        self.flies_on, self.surfaces, self.alive = store["flies_on"], store["surfaces"], store["alive"]
+        self.flies_on, self.alive = store["flies_on"], store["alive"]
+        self.surfaces, self.steps = store["surfaces"], store["steps"]
 
     @property
     def free(self) -> int:
@@ -98,7 +101,7 @@ class Paths:
         store["density"][new], store["flown"][new] = np.inf, 0
         store["flies_on"][new] = False
         store["branch"][new] = WHOLE
-        store["surfaces"][new] = 0
+        store["surfaces"][new] = store["steps"][new] = 0
         store["alive"][new] = True
 
     def append(self, others: Paths, index: NDArray[np.intp]) -> slice:

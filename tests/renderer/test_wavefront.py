@@ -17,6 +17,7 @@ from sss_tools.shapes import box, icosphere, moved
 from tests.assertions import assert_mean, seed
 from tests.renderer.scenes import (
     WHITE_SKY,
+    Picture,
     bumpy_ball,
     camera,
     diffuse,
@@ -197,6 +198,27 @@ def test_roulette_without_its_weight_is_caught(followed, monkeypatch):
     played, _ = absorbing_ball_means(1)
     with pytest.raises(AssertionError, match="wrong mean"):
         assert_mean(played[0] - followed[0][0], 0, false_alarm=3e-4, detects=0.05 * followed[0][0].mean())
+
+
+def white_ball(monkeypatch, many_steps: int = 16) -> Picture:
+    """All light comes out again. Half of the walks end after so many steps, half of the others after twice as many."""
+    monkeypatch.setattr(roulette, "MANY_STEPS", many_steps)
+    view = camera((0, 0, 5), fov=16, resolution=(48, 48))
+    ball = placed(icosphere(1, 4), translucent(1.0, 8.0, 0.0, 1.5))
+    return picture(scene([ball], [WHITE_SKY], view), 32, seed=seed(3))
+
+
+def test_ending_half_of_the_long_walks_does_not_change_the_mean(monkeypatch):
+    """Sees 3 %."""
+    played = white_ball(monkeypatch)
+    assert_mean(played.pass_means(), 1, false_alarm=3e-4, detects=0.03)
+    assert played.tally.collisions < 0.7 * white_ball(monkeypatch, 2**30).tally.collisions
+
+
+def test_long_walks_that_are_not_weighed_up_are_caught(monkeypatch):
+    forget_the_weight(monkeypatch)
+    with pytest.raises(AssertionError, match="wrong mean"):
+        assert_mean(white_ball(monkeypatch).pass_means(), 1, false_alarm=3e-4, detects=0.03)
 
 
 def test_light_caught_between_two_mirrors_comes_to_an_end():
