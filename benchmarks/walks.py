@@ -5,7 +5,8 @@
 An elephant, 100 x 100 pixels, lit by a dim sky and one large rectangle, in media from dark to white and from thin to
 dense. Speed is CPU time of one thread; noise is the standard deviation of one sample over the mean, root mean square
 over the pixels of the object; the gain is that of speed over noise squared against plain walks, set-up left out and
-reported apart. Writes walks.json and walks.md into FOLDER, docs/ by default.
+reported apart. Then the same under a sun, with a rough boundary: lit from collisions as well, or at the boundary alone.
+Writes walks.json and walks.md into FOLDER, docs/ by default.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ from benchmarks.first_figures import machine
 from renderer.optics.ball_jump import ball_jumps
 from renderer.optics.guided_flight import Guide
 from renderer.scene.camera import CameraRays
-from renderer.scene.description import Translucent
+from renderer.scene.description import DirectionalLight, Translucent
 from renderer.scene.staging import stage_mesh
 from renderer.strips import WholePass, traced_passes
 from renderer.tracing.acceleration import Acceleration
@@ -47,6 +48,9 @@ MEDIA = {
     "white": (0.998, 0.02),
     "white, dense": (0.999, 0.005),
 }
+ROUGHNESSES = (0.1, 0.3, 1.0)
+SUNS = {"in front": (-1.0, -1.5, -1.0), "behind": (-0.6, -0.7, 1.0)}
+"""The way their light goes; the camera looks along -z."""
 
 
 def main() -> None:
@@ -60,7 +64,13 @@ def main() -> None:
     measured = {name: measure(mesh, *medium, options.passes) for name, medium in MEDIA.items()}
     threads = {f"{name}, {block} paths": scaling(mesh, *MEDIA[name], block, options.passes)
                for name in ("grey", "white, dense") for block in (16384, 131072)}  # fmt: skip
-    figures = {"machine": machine(2), "media": measured, "threads": threads}
+    rough = [
+        {"medium": name, "roughness": roughness, "sun": sun, **connected(mesh, *medium, roughness, sun, options.passes)}
+        for name, medium in MEDIA.items()
+        for roughness in ROUGHNESSES
+        for sun in SUNS
+    ]
+    figures = {"machine": machine(2), "media": measured, "threads": threads, "rough": rough}
     options.output.mkdir(parents=True, exist_ok=True)
     (options.output / "walks.json").write_text(json.dumps(figures, indent=1) + "\n")
     table = markdown(figures)
@@ -68,11 +78,12 @@ def main() -> None:
     print(table)
 
 
-def ready(mesh, albedo: float, mean_free_path: float):
-    """The scene as the tracer sees it, its camera and its medium."""
+def ready(mesh, albedo: float, mean_free_path: float, roughness: float = 0.0, lights=None):
+    """The scene as the tracer sees it, and its camera; ``lights`` in place of the sky and the rectangle."""
     staged = stage_mesh(mesh, size=SIZE)
     medium = Medium.from_albedo(albedo, 1 / (mean_free_path * mesh.longest_side), ior=1.5)
-    scene = replace(staged, objects=(replace(staged.objects[0], material=Translucent(medium)),), hash="")
+    body = replace(staged.objects[0], material=Translucent(medium, roughness))
+    scene = replace(staged, objects=(body,), lights=lights or staged.lights, hash="")
     traced = TracedScene(scene, ["path"], ["strict"])
     return traced, CameraRays(scene.camera, traced.frame)
 
@@ -101,6 +112,20 @@ def measure(mesh, albedo: float, mean_free_path: float, passes: int) -> dict:
         row["gain"] = row["speed"] / row["noise"] ** 2 * rows["plain"]["noise"] ** 2 / rows["plain"]["speed"]
     return {"albedo": albedo, "mean_free_path": mean_free_path, "grid_seconds": grid_seconds,
             "tables_seconds": tables_seconds, "chosen": describe(chosen), "ways": rows}  # fmt: skip
+
+
+def connected(mesh, albedo: float, mean_free_path: float, roughness: float, sun: str, passes: int) -> dict:
+    """Speed and noise with collisions connected to a sun through the boundary, and gain over the boundary alone."""
+    lights = (DirectionalLight(np.array(SUNS[sun]), np.full(3, 3.0)),)
+    rows = []
+    for through in (True, False):
+        traced, camera = ready(mesh, albedo, mean_free_path, roughness, lights)
+        if not through:
+            traced.lit_collisions = [replace(lit, rough=False) for lit in traced.lit_collisions]
+        rows.append(way_measured(traced, camera, Acceleration.chosen(traced, 250_000), passes))
+    row, alone = rows
+    gain = row["speed"] / row["noise"] ** 2 * alone["noise"] ** 2 / alone["speed"]
+    return {**row, "alone": alone, "gain": gain}
 
 
 def passes_of(tracer: Wavefront, passes: range) -> tuple[list[WholePass], Tally]:
@@ -183,6 +208,20 @@ def markdown(figures: dict) -> str:
     ]
     for name, row in figures["threads"].items():
         lines.append(f"| {name} | {row['one'] / 1e3:.0f} | {row['two'] / 1e3:.0f} | {row['ratio']:.2f} |")
+    lines += [
+        "",
+        "Under a sun, with a rough boundary: collisions connected to it through the boundary (in brackets: the "
+        "boundary alone).",
+        "",
+        "| medium | roughness | sun | thousand samples / CPU s | noise | gain |",
+        "|---|---:|---|---:|---:|---:|",
+    ]
+    for row in figures["rough"]:
+        alone = row["alone"]
+        lines.append(
+            f"| {row['medium']} | {row['roughness']:g} | {row['sun']} | {row['speed'] / 1e3:.0f} "
+            f"({alone['speed'] / 1e3:.0f}) | {row['noise']:.2f} ({alone['noise']:.2f}) | {row['gain']:.1f} |"
+        )
     about = figures["machine"]
     lines += [
         "",
