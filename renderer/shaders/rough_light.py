@@ -35,6 +35,8 @@ Float32 = NDArray[np.float32]
 
 _GUIDED = np.float32(0.5)
 """Share of the directions that is drawn from the light behind facets, where there are any."""
+_WIDER = 0.1
+"""Added to the roughness there: the boundary where a direction ends is turned against the one straight ahead."""
 
 
 class RoughLight:
@@ -46,7 +48,7 @@ class RoughLight:
         # copies of the paths stand at the boundary and are lit as if they had flown there
         self._ends = Paths(paths.capacity, scene.media.count)
         self._bound, self._scratch = np.empty(paths.capacity, np.float32), Scratch(paths.capacity)
-        self._alpha = scene.translucent[slot].roughness
+        self._width = scene.translucent[slot].roughness + _WIDER
         self._ior, self._g = np.float32(scene.media.ior[slot]), scene.media.g[slot]
         self._sigma_t = scene.media.sigma_t[:, slot, None]
         self._rough = np.array([*(thing.roughness > 0 for thing in scene.translucent), False])
@@ -109,18 +111,18 @@ class RoughLight:
         light = frame.to_local(to_light[:, known])
         guided = np.flatnonzero(choice[known] < _GUIDED)
         turned = known[guided]
-        bent, inside = _bent(light[:, guided], self._alpha, self._ior, u1[turned], u2[turned])
+        bent, inside = _bent(light[:, guided], self._width, self._ior, u1[turned], u2[turned])
         direction[:, turned] = -frame.take(guided).to_world(bent)
         phase = henyey_greenstein(np.einsum("ij,ij->j", before, direction), self._g)
         density = phase.copy()
         local = frame.to_local(-direction[:, known])
-        behind, _ = turning(light, local, self._ior, self._alpha)
+        behind, _ = turning(light, local, self._ior, self._width)
         density[known] += _GUIDED * (np.where(local[2] < 0, behind, 0) - density[known])
         density[turned[~inside]] = np.inf
         return direction, phase, density
 
 
-def _bent(light: Float32, alpha: float, ior: np.float32, u1: Float32, u2: Float32) -> tuple[Float32, NDArray[np.bool_]]:
+def _bent(light: Float32, width: float, ior: np.float32, u1: Float32, u2: Float32) -> tuple[Float32, NDArray[np.bool_]]:
     """(3, n) directions in which facets send light on that comes from ``light`` (3, n), all in the local frame, and
     (n,) whether they lead inside.
 
@@ -128,7 +130,7 @@ def _bent(light: Float32, alpha: float, ior: np.float32, u1: Float32, u2: Float3
 
     Walter et al. 2007, eq. 40.
     """
-    facet = sample_visible_facet(light, alpha, u1, u2)
+    facet = sample_visible_facet(light, width, u1, u2)
     cosine = np.einsum("ij,ij->j", light, facet) / ior
     bent = (cosine - np.sqrt(1 - 1 / (ior * ior) + cosine * cosine)) * facet - light / ior
     bent /= np.sqrt(np.maximum(np.einsum("ij,ij->j", bent, bent), np.float32(1e-20)))
