@@ -12,6 +12,9 @@ Each case runs until its standard error is --error (0.1 %) of the value, or its 
 reached. z counts the table's own uncertainty. All cases together raise a false alarm with probability 1e-3 (Sidak); the
 limit is stated. --resume adds to what an earlier call has measured. Exit status 1 where a case is beyond the limit.
 
+All cases draw the same random numbers, so z of cases that are alike are alike: their mean tells nothing, and --seed makes
+others.
+
 Blind to: what cancels between directions and positions of light, as only totals are compared; errors of less than
 (limit + 1.64) standard errors are found with less than 95 % probability.
 """
@@ -40,7 +43,6 @@ FAMILY = 1e-3
 INFINITE = "inf"
 LEAST_VALUE = 1e-3
 LEAST_MEANS = 12
-"""Fewer tell too little of their own error for z to be normal."""
 SIZE, CUBE_SIZE = (128, 64), (96, 96)
 NEAR = 1e-3
 """Distance of the point for diffuse incidence from the slab, of the slab's width: where it sees the slab's end, within
@@ -81,8 +83,9 @@ class Row:
 
     @property
     def z(self) -> float:
-        """Difference from the table in standard errors of both."""
-        return (self.mean - self.value) / np.hypot(self.error, self.uncertainty)
+        """Difference from the table in standard errors of both, as normal as if the means told their error exactly."""
+        t = (self.mean - self.value) / np.hypot(self.error, self.uncertainty)
+        return float(np.copysign(stats.norm.isf(stats.t.sf(abs(t), self.count - 1)), t))
 
 
 @dataclass(frozen=True)
