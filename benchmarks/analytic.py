@@ -12,7 +12,7 @@ Each case runs until its standard error is --error (0.1 %) of the value, or its 
 reached. z counts the table's own uncertainty. All cases together raise a false alarm with probability 1e-3 (Sidak); the
 limit is stated. --resume adds to what an earlier call has measured. Exit status 1 where a case is beyond the limit.
 
-All cases draw the same random numbers, so z of cases that are alike are alike: their mean tells nothing, and --seed makes
+All cases draw the same random numbers, so those that are alike have like z: their mean tells nothing, and --seed makes
 others.
 
 Blind to: what cancels between directions and positions of light, as only totals are compared; errors of less than
