@@ -5,6 +5,7 @@ A beam is a triangle swept along one direction, or along the directions of a nar
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from itertools import pairwise
 
 import numpy as np
@@ -14,6 +15,8 @@ Float64 = NDArray[np.float64]
 MOST_ENTRIES = 8_000_000
 _MOST_CELLS = 4_000_000
 _CHUNK_ENTRIES = 100_000
+_CHUNK_PAIRS = 400_000
+"""Some 100 MB of temporaries where pairs are looked at."""
 _LARGE = 12
 STEEPEST = 0.1
 """Least component of a beam's directions along its main axis; wider cones are not entered but tried everywhere."""
@@ -44,7 +47,7 @@ class BeamGrid:
         cells, beams = [np.empty(0, np.int32)], [np.empty(0, np.int32)]
         for k in range(3):
             rows = np.flatnonzero((axis == k) & ~wide)
-            for part in _parts(self._columns_estimate(corners[rows], reach[rows])):
+            for part in _parts(self._columns_estimate(corners[rows], reach[rows]), _CHUNK_ENTRIES):
                 cell, beam = self._enter(k, rows[part], corners, direction, spread, reach, planes)
                 cells.append(cell)
                 beams.append(self._name[beam])
@@ -60,20 +63,22 @@ class BeamGrid:
         """Bytes of the lists."""
         return self._start.nbytes + self._beam.nbytes
 
-    def candidates(self, position: Float64) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-        """Points and beams, (c,) each, of all pairs that may meet; position (3, n)."""
+    def candidates(self, position: Float64) -> Iterator[tuple[NDArray[np.intp], NDArray[np.intp]]]:
+        """Points and beams, (c,) each, of all pairs that may meet, some ``_CHUNK_PAIRS`` at a time; position (3, n)."""
         at = ((position - self._lower[:, None]) / self.cell).astype(np.int64)
         for row, size in zip(at, self.shape, strict=True):
             np.clip(row, 0, size - 1, out=row)
         cell = (at[0] * self.shape[1] + at[1]) * self.shape[2] + at[2]
         start = self._start[cell]
         count = self._start[cell + 1] - start
-        point = np.repeat(np.arange(len(cell)), count)
-        beam = self._beam[_ranges(start, count)]
-        if len(self.everywhere):
-            point = np.concatenate([point, np.repeat(np.arange(len(cell)), len(self.everywhere))])
-            beam = np.concatenate([beam, np.tile(self.everywhere, len(cell))])
-        return point, beam.astype(np.intp)
+        for part in _parts(count + len(self.everywhere), _CHUNK_PAIRS):
+            some = np.arange(part.start, part.stop)
+            point = np.repeat(some, count[part])
+            beam = self._beam[_ranges(start[part], count[part])]
+            if len(self.everywhere):
+                point = np.concatenate([point, np.repeat(some, len(self.everywhere))])
+                beam = np.concatenate([beam, np.tile(self.everywhere, len(some))])
+            yield point, beam.astype(np.intp)
 
     def cells_of(self, corners: Float64) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
         """Triangles and beams, (c,) each, of all pairs that share a cell (with repeats); corners (m, 3, 3)."""
@@ -185,9 +190,9 @@ def _entries_of(corners: Float64, reach: Float64, cell: float, extent: Float64) 
     return (length / cell + 1) * (size[:, 1] / cell + 1.5) * (size[:, 2] / cell + 1.5)
 
 
-def _parts(estimate: Float64) -> list[slice]:
-    """Slices of some ``_CHUNK_ENTRIES`` entries each."""
-    part = (np.cumsum(estimate) / _CHUNK_ENTRIES).astype(np.int64)
+def _parts(estimate: NDArray, entries: int) -> list[slice]:
+    """Slices of some ``entries`` each."""
+    part = (np.cumsum(estimate) / entries).astype(np.int64)
     edges = [0, *(np.flatnonzero(np.diff(part)) + 1), len(estimate)]
     return [slice(a, b) for a, b in pairwise(edges) if b > a]
 

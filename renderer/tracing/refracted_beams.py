@@ -53,10 +53,13 @@ class Arrivals:
 
     @classmethod
     def joined(cls, parts: list[Arrivals]) -> Arrivals:
-        """All pairs of parts of the first generation, of which there is at least one."""
+        """All pairs of parts of one generation, of which there is at least one."""
+        if len(parts) == 1:
+            return parts[0]
 
         def ways(name: str) -> list[NDArray]:
-            return [np.concatenate([getattr(part, name)[0] for part in parts], axis=-1)]
+            legs = zip(*(getattr(part, name) for part in parts), strict=True)
+            return [np.concatenate(leg, axis=-1) for leg in legs]
 
         def rows(name: str) -> NDArray:
             return np.concatenate([getattr(part, name) for part in parts])
@@ -213,9 +216,11 @@ class RefractedBeams:
     def near_arrivals(self, position: NDArray, generation: int = 0) -> Arrivals:
         """All beams of a generation that reach points (3, n) within ``near``, whatever may stand in their way."""
         position = position.astype(float)
-        point, beam = self.generations[generation].grid.candidates(position)
-        found = self._arrivals(position, point, beam, generation, min(self.near, self._diagonal))
-        return found if self.all_near else found.take(np.flatnonzero(found.length <= self.near))
+        found = []
+        for point, beam in self.generations[generation].grid.candidates(position):
+            part = self._arrivals(position, point, beam, generation, min(self.near, self._diagonal))
+            found.append(part if self.all_near else part.take(np.flatnonzero(part.length <= self.near)))
+        return Arrivals.joined(found)
 
     def far_arrivals(self, position: NDArray) -> Arrivals:
         """All unmirrored beams that reach points from farther than ``near``; every beam is tried."""
