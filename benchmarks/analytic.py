@@ -178,8 +178,9 @@ def cases(tables: dict) -> list[Case]:
     found = []
 
     def add(row, tau, what, value, uncertainty):
-        # smaller shares are carried by so few paths that their spread is not seen before most of them are
-        if value > LEAST_VALUE:
+        # smaller shares are carried by so few paths that their spread is not seen before most of them are; and
+        # walks in a white half-space have no mean length
+        if value > LEAST_VALUE and (row["albedo"] < 1 or np.isfinite(tau)):
             found.append(Case(row["albedo"], tau, row["g"], row["n"], what, value, max(uncertainty, 5e-7)))
 
     quantities = ("R_normal", "T_normal", "R_diffuse", "T_diffuse")
