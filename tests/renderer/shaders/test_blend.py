@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
 
+from renderer.columns import Columns
 from renderer.render import Renderer, Settings, planned_hash
-from renderer.scene.description import DirectionalLight, EnvironmentLight
+from renderer.scene.description import DirectionalLight, EnvironmentLight, RectangleLight
 from renderer.shaders import selection
 from renderer.shaders.blend import Blend, Choices
 from renderer.tracing.streams import stream_keys
@@ -18,11 +19,12 @@ LIGHTS = [
     EnvironmentLight(radiance=np.array([0.3, 0.2, 0.1])),
     DirectionalLight(np.array([-1.0, -1, -0.3]), np.full(3, 2.0)),
 ]
+LAMP = RectangleLight(np.array([3.0, 3.0, 2.0]), np.zeros(3), np.array([0.0, 1.0, 0.0]), (2.0, 2.0), np.full(3, 2.0))
 VIEW = camera((0.5, 1.5, 6), fov=35, resolution=(40, 30))
 KEYS = stream_keys(3, 0, np.arange(200_000))
 
 
-def lit(shares, things=None, threads=1):
+def lit(shares, things=None, threads=1, lights=LIGHTS):
     """A renderer whose objects have these shares, whatever the selection says."""
     things = things or [placed(bumpy_ball(3), translucent(0.8, 4.0))]
     select = selection.select
@@ -33,7 +35,7 @@ def lit(shares, things=None, threads=1):
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(selection, "select", chosen)
-        return Renderer(scene(things, LIGHTS, VIEW), Settings(threads=threads))
+        return Renderer(scene(things, lights, VIEW), Settings(threads=threads))
 
 
 def sums(renderer, passes=(0,)):
@@ -86,6 +88,27 @@ def test_two_objects_that_mix_path_and_plumb_are_bit_equal_for_any_threads_and_s
     sums(parts[0], range(1)), sums(parts[1], range(1, 4))
     parts[0].film.merge(parts[1].film)
     np.testing.assert_allclose(parts[0].film.sum, whole, rtol=1e-12)
+
+
+@pytest.mark.parametrize("light", [EnvironmentLight(radiance=np.ones(3)), LAMP], ids=lambda light: type(light).__name__)
+def test_passes_overlap_and_each_is_lit_by_its_own_beams(light):
+    """Plumb probes an even sky along other axes in each pass, and a lamp at other places. Bit for bit; whole passes are
+    begun before the one before has ended."""
+    mixed = lit({"plumb": 0.4, "path": 0.6}, lights=[light])
+    alone = [sums(lit({"plumb": 0.4, "path": 0.6}, lights=[light]), [number]) for number in (3, 4, 5)]
+    assert not np.array_equal(alone[0], alone[1])
+    most, put = 0, Columns.put
+
+    def noted(columns, strip, step):
+        nonlocal most
+        put(columns, strip, step)
+        most = max(most, len(columns.passes))
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Columns, "put", noted)
+        together = sums(mixed, range(3, 6))
+    assert most == 3
+    assert_array_equal(together, alone[0] + alone[1] + alone[2])
 
 
 def test_films_of_other_shares_do_not_add_up():
