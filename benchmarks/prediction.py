@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import argparse
 import json
+from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
@@ -132,15 +133,17 @@ def _chosen(case: Case, by: dict[str, Fit], quality: float) -> Judged:
     errors, noise = predicted_errors(case.look, by), predicted_noise(case.look, by)
     shares = shares_of({name: error.bound for name, error in errors.items()}, demand, size)
     shader = max(shares, key=shares.__getitem__)
-    quiet = noise_allowed(allowed, [error.error for error in errors.values()])
-    passes, seen = _passes_of_path(case, noise, quiet)
-    measured = dict(case.measured.errors) | {"path": _scaled(case.measured.noise, passes)}
-    planned = errors | {"path": _scaled(noise, passes_within(noise.bound, quiet))}
-    told = errors | {"path": _scaled(seen, passes)}
-    found, before, after = (sum(share * of[name].error for name, share in shares.items())
-                            for of in (measured, planned, told))  # fmt: skip
-    squared, doubt = (sum(share * getattr(measured[name], what) for name, share in shares.items())
+    by_path = shares.pop("path", 0.0)
+    quiet = noise_allowed(allowed, [error.error for error in errors.values()], by_path)
+    passes, seen = _passes_of_path(case, noise, quiet, by_path)
+    before = _error(errors, shares, noise, by_path / passes_within(by_path**0.5 * noise.bound, quiet))
+    after = _error(errors, shares, seen, by_path / passes)
+    found = _error(case.measured.errors, shares, case.measured.noise, by_path / passes)
+    # what errors add up to is squared, without bias and at most: (sum of s b)^2 <= (sum of s) (sum of s b^2)
+    squared, doubt = (sum(shares.values()) * sum(share * getattr(case.measured.errors[name], what)
+                                                 for name, share in shares.items())
                       for what in ("squared", "doubt"))  # fmt: skip
+    squared += case.measured.noise.error**2 * by_path / passes
     low, high = (max(squared + sign * doubt, 0.0) ** 0.5 for sign in (-1, 1))
     return Judged(
         shader, squared <= allowed**2, low <= allowed, squared - SURE * doubt > allowed**2, before, after, found,
@@ -148,20 +151,21 @@ def _chosen(case: Case, by: dict[str, Fit], quality: float) -> Judged:
     )  # fmt: skip
 
 
-def _passes_of_path(case: Case, planned: Error, allowed: float) -> tuple[int, Error]:
-    """Passes of a render that goes by its own noise, and the noise it has seen."""
-    done, noise = next_round(0, passes_within(planned.bound, allowed)), planned
+def _error(errors: Mapping[str, Error], shares: Mapping[str, float], noise: Error, left: float) -> float:
+    """Of an object: its shaders' by their shares, and of path's variance the part ``left``."""
+    return float(np.hypot(sum(share * errors[name].error for name, share in shares.items()), noise.error * left**0.5))
+
+
+def _passes_of_path(case: Case, planned: Error, allowed: float, share: float) -> tuple[int, Error]:
+    """Passes of a render that goes by its own noise, with a ``share`` of the samples by path, and the noise it has
+    seen."""
+    noise, done = planned, 0
     while True:
-        known = [error for passes, error in case.seen if passes <= done]
-        noise = known[-1] if known else noise
-        following = next_round(done, passes_within(noise.bound, allowed) if known else done)
+        noise = next((error for passes, error in reversed(case.seen) if passes <= share * done), noise)
+        following = next_round(done, passes_within(share**0.5 * noise.bound, allowed))
         if following <= done:
             return done, noise
         done = following
-
-
-def _scaled(noise: Error, passes: int) -> Error:
-    return Error(noise.error * passes**-0.5, noise.bound * passes**-0.5)
 
 
 def _factor_2(ratios: list[float]) -> float:

@@ -31,7 +31,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.dolly import LIGHTS, body
-from renderer.enough import is_by_path, rounds
+from renderer.enough import rounds
 from renderer.output.film import Film
 from renderer.render import Renderer, Settings
 from renderer.scene.admission import admit
@@ -164,7 +164,7 @@ def measured(scene: Scene, quality: float, reference: Film) -> Step:
             renderer.run(range(renderer.film.passes, passes))
         taken.append(time.process_time() - start)
     film, where = renderer.film, reference.object_pixels()
-    if is_by_path(plan) and film.passes > 1:
+    if set(plan.shares) == {"path"} and film.passes > 1:
         squares = film.stderr()[where] ** 2
     else:
         squares = (film.mean()[where] - reference.mean()[where]) ** 2 - reference.stderr()[where] ** 2

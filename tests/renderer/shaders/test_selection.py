@@ -1,5 +1,6 @@
 """Which shader for which object."""
 
+import math
 from dataclasses import replace
 from itertools import pairwise
 
@@ -12,11 +13,13 @@ from renderer.shaders import prediction
 from renderer.shaders.appearance import Appearance, appearance, pixel_footprint
 from renderer.shaders.prediction import Error, predicted_errors
 from renderer.shaders.selection import (
+    ADDED,
     CHEAPEST_FIRST,
     FADE,
     MOST_PASSES,
     Demand,
     Measured,
+    noise_allowed,
     passes_within,
     picture_passes,
     select,
@@ -143,10 +146,28 @@ def test_path_is_not_chosen_to_be_noisier_than_others_are_wrong():
     errors = {name: Error(0.05, 0.5) for name in CHEAPEST_FIRST[:-1]}
     found = {"thing": Measured(errors, Error(1.0, 1.0))}
     (plan,) = select(ball_at(3), target_error=0.2, measured=found)
-    assert plan.shader == "path" and plan.noise_allowed < 0.05
+    assert plan.shader == "path" and plan.noise_allowed == pytest.approx(0.05)
     assert plan.predicted_error == pytest.approx(plan.noise_allowed, rel=0.02)
     (asked,) = select(ball_at(3), shader="path", target_error=0.2, measured=found)
     assert asked.noise_allowed == pytest.approx(0.2) and asked.passes < plan.passes / 10
+
+
+def test_noise_is_outweighed_by_the_error_that_path_takes_away():
+    """Scalar is 5 % wrong; what is told falls to that of path, rising at most by a twentieth at the beginning."""
+    told = [math.hypot((1 - share) * 0.05, noise_allowed(0.2, [0.3, 0.05], share)) for share in np.linspace(0, 1, 11)]
+    assert all(b <= a for a, b in pairwise(told))
+    assert told[0] == pytest.approx(0.05 * math.sqrt(1 + ADDED)) and told[-1] == pytest.approx(0.05)
+    assert noise_allowed(0.02, [0.3, 0.05]) == pytest.approx(0.02)
+
+
+def test_more_quality_is_told_to_be_less_wrong_and_never_takes_fewer_passes():
+    for distance in (4, 40):
+        of = ball_at(distance)
+        plans = [select(of, quality)[0] for quality in np.linspace(0, 1, 101)]
+        assert {name for plan in plans for name in plan.shares} >= {"scalar", "path"}
+        assert all(b.passes >= a.passes for a, b in pairwise(plans))
+        errors = [plan.predicted_error for plan in plans]
+        assert all(b <= 1.05 * a for a, b in pairwise(errors)) and errors[-1] < errors[0] / 5
 
 
 def test_the_picture_has_the_passes_of_its_most_demanding_object():
