@@ -35,6 +35,8 @@ CHEAPEST_FIRST = ("diffuse", "scalar", "plumb", "path")
 FADE = 2.2
 """Factor around a threshold, in sizes or errors, within which both shaders have samples: so wide that shaders a tenth
 apart change an object by less than a hundredth while it recedes by a tenth."""
+LEAST_SHARE = 0.002
+"""A shader with a smaller share of an object's samples is left out: nobody sees it, and something is built for it."""
 ADDED = 0.1
 """Share of its noise, squared, that path may bring to an object where it begins to take a part in it: it then has
 passes in proportion to its part, and not at once all that it needs to outweigh its noise by the error it takes away."""
@@ -287,7 +289,7 @@ class _Chooser:
         how = "measured by a pilot to be" if candidates[0].measured else "predicted"
         chosen = max(shares, key=shares.__getitem__)
         if len(shares) > 1:
-            mixture = ", ".join(f"{100 * share:.2g} % of the samples by {name}" for name, share in shares.items())
+            mixture = ", ".join(f"{100 * share:.3g} % of the samples by {name}" for name, share in shares.items())
             where = f"near a threshold: {mixture}; {where}"
         if chosen == "path":
             best = min(candidates[:-1], key=lambda one: one.error_bound)
@@ -308,7 +310,9 @@ def shares_of(bounds: Mapping[str, float], demand: Demand, size_px: float, fade:
         if enough > taken:
             shares[name] = enough - taken
             taken = enough
-    return shares
+    kept = {name: share for name, share in shares.items() if share >= LEAST_SHARE}
+    whole = sum(kept.values())
+    return {name: share / whole for name, share in kept.items()} if len(kept) < len(shares) else shares
 
 
 def _fades(thing: SceneObject) -> bool:

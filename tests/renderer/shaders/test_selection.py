@@ -16,6 +16,7 @@ from renderer.shaders.selection import (
     ADDED,
     CHEAPEST_FIRST,
     FADE,
+    LEAST_SHARE,
     MOST_PASSES,
     Demand,
     Measured,
@@ -23,6 +24,7 @@ from renderer.shaders.selection import (
     passes_within,
     picture_passes,
     select,
+    shares_of,
     tolerance,
 )
 from sss_tools import shapes
@@ -120,6 +122,17 @@ def test_the_noise_of_path_is_predicted_for_the_passes_there_will_be():
     # what counts is within the tolerance; the cap on passes takes half a percent of these few
     assert noise.error < noise.bound
     assert noise.bound / plan.passes**0.5 <= 1.01 * plan.tolerance
+
+
+def test_a_shader_with_hardly_a_share_is_left_out_and_the_shares_still_add_up():
+    """Nothing is built for one sample in a thousand."""
+    many = Demand(0.5)
+    for size in np.geomspace(1, 1000, 200):
+        shares = shares_of({"diffuse": 0.1, "scalar": 0.0999, "plumb": 0.06}, many, size)
+        assert min(shares.values()) >= LEAST_SHARE and sum(shares.values()) == pytest.approx(1)
+    near = 64 / (0.1 / tolerance(0.5, math.inf) - 1) / FADE
+    assert shares_of({"diffuse": 0.1, "scalar": 1.0, "plumb": 1.0}, many, 1.01 * near) == {"diffuse": 1.0}
+    assert len(shares_of({"diffuse": 0.1, "scalar": 1.0, "plumb": 1.0}, many, 1.1 * near)) == 2
 
 
 # ---- passes from the quality ----
