@@ -153,15 +153,17 @@ def noise_allowed(allowed: float, others: Sequence[float], share: float = 1.0) -
     """The noise that an object may have within ``allowed`` where path lights a ``share`` of its samples, chosen over
     shaders with the errors ``others``.
 
-    A dearer picture that is noisier than the cheaper one would be wrong is of use to nobody. So the noise is at most
-    r = min(allowed, least of the others) in the end, and while others light a share s of the samples
+    A dearer picture that is noisier than the cheaper one would be wrong is of use to nobody. So the noise r is within
+    ``allowed`` and below the least of the others in the end, as many passes as both need together, so that more quality
+    is always more of them. While others light a share s of the samples it is within
 
         r sqrt(1 - s^2),
 
     which with their own error, s times as large, is no more than that error was: as s falls the whole never rises, but
     for ``ADDED`` at the beginning.
     """
-    return min([allowed, *others]) * math.sqrt(1 - (1 - ADDED) * (1 - share) ** 2)
+    least = 1 / math.hypot(1 / allowed, 1 / min(others, default=math.inf))
+    return least * math.sqrt(1 - (1 - ADDED) * (1 - share) ** 2)
 
 
 def picture_passes(plans: Sequence[Plan]) -> int:

@@ -64,19 +64,32 @@ def test_branches_choose_as_their_path_did():
                                     {"diffuse": 0.2, "scalar": 0.3, "path": 0.5}], ids=str)  # fmt: skip
 def test_each_sample_is_that_of_the_shader_it_chose(shares):
     """Bit for bit, all that the sample meets on its way included. Frames of fast shaders alone have a tracer of their
-    own, so these samples are those of the wavefront."""
+    own, so where path takes part the others' samples are those of the wavefront."""
     mixed = lit(shares)
     got = sums(mixed)
     chosen = mixed._blends[0].choose(stream_keys(0, 0, np.arange(40 * 30))).reshape(30, 40)
     for number, name in enumerate(shares):
         pure = lit({name: 1.0})
-        pure._frames = None
+        if "path" in shares:
+            pure._frames = None
+        assert (mixed._frames is None) == (pure._frames is None)
         here = chosen == number
         assert_array_equal(got[here], sums(pure)[here])
     hit = mixed.film.hits > 0
     for number in range(len(shares)):
         assert (hit & (chosen == number)).any()
     assert mixed.film.biased[hit].all()
+
+
+def test_frames_that_mix_fast_shaders_are_the_wavefronts():
+    """To rounding, but for a pixel of a hundred where a chord or a shadow slips past an edge."""
+    things = [placed(moved(bumpy_ball(3), (x, 0, 0)), translucent(0.8, 4.0), name=str(x)) for x in (-1.2, 1.2)]
+    direct, wavefront = (lit({"diffuse": 0.3, "plumb": 0.7}, things) for _ in range(2))
+    wavefront._frames = None
+    assert direct._frames is not None
+    ours, twins = sums(direct), sums(wavefront)
+    assert_array_equal(direct.film.hits, wavefront.film.hits)
+    assert (np.abs(ours - twins) > 1e-4 * (twins + 0.01)).any(axis=-1).mean() < 0.01
 
 
 def test_two_objects_that_mix_path_and_plumb_are_bit_equal_for_any_threads_and_split():

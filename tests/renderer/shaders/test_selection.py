@@ -159,7 +159,7 @@ def test_path_is_not_chosen_to_be_noisier_than_others_are_wrong():
     errors = {name: Error(0.05, 0.5) for name in CHEAPEST_FIRST[:-1]}
     found = {"thing": Measured(errors, Error(1.0, 1.0))}
     (plan,) = select(ball_at(3), target_error=0.2, measured=found)
-    assert plan.shader == "path" and plan.noise_allowed == pytest.approx(0.05)
+    assert plan.shader == "path" and plan.noise_allowed < 0.05
     assert plan.predicted_error == pytest.approx(plan.noise_allowed, rel=0.02)
     (asked,) = select(ball_at(3), shader="path", target_error=0.2, measured=found)
     assert asked.noise_allowed == pytest.approx(0.2) and asked.passes < plan.passes / 10
@@ -169,8 +169,8 @@ def test_noise_is_outweighed_by_the_error_that_path_takes_away():
     """Scalar is 5 % wrong; what is told falls to that of path, rising at most by a twentieth at the beginning."""
     told = [math.hypot((1 - share) * 0.05, noise_allowed(0.2, [0.3, 0.05], share)) for share in np.linspace(0, 1, 11)]
     assert all(b <= a for a, b in pairwise(told))
-    assert told[0] == pytest.approx(0.05 * math.sqrt(1 + ADDED)) and told[-1] == pytest.approx(0.05)
-    assert noise_allowed(0.02, [0.3, 0.05]) == pytest.approx(0.02)
+    assert told[0] < 0.05 * math.sqrt(1 + ADDED) and 0.04 < told[-1] < 0.05
+    assert 0.018 < noise_allowed(0.02, [0.3, 0.05]) < 0.02
 
 
 def test_more_quality_is_told_to_be_less_wrong_and_never_takes_fewer_passes():
