@@ -271,17 +271,17 @@ def markdown(found: dict[str, Sweeps], options) -> str:
     good = [sum(verdict(one.steps[way]) == "monotone" for one in found.values()) for way in WAYS]
     return f"""# The steps of --quality
 
-Six scenes, {options.size} pixels square, {options.steps} steps each. In {good[0]} of {len(found)} by prediction, and in
-{good[1]} with `--pilot`, the error falls and the time rises with every step, and none is beaten by another in both.
-Where that is not so a fast shader is less wrong than predicted: path, which replaces it, is asked for no less noise
-than the prediction says it is wrong. A pilot knows better.
+Six scenes, {options.size} pixels square, {options.steps} steps each. In {good[0]} of {len(found)} by prediction,
+and in {good[1]} with `--pilot`, the error falls and the time rises with every step, and none is beaten by
+another in both. Where that is not so a fast shader is less wrong than predicted: path, which replaces it, is asked for
+no less noise than the prediction says that shader is wrong. A pilot knows better.
 
-Errors are root mean squares over object pixels and channels as a share of the mean, against path at
-{options.reference} passes, whose noise is taken off; where path lights all of the object they are its own standard
-error. Two steps are held against each other pixel by pixel: an error rises if it is above the one before by more than
-{SURE:g} standard errors of their difference. Seconds are CPU seconds of the passes without set-up and pilot, and tell
-apart what differs by more than {100 * CLOCK:.0f} % and {1000 * TICK:.0f} ms: frames of fast shaders take 1 to 3 ms at
-this size. Made by `benchmarks/quality.py`.
+Errors are root mean squares over object pixels and channels as a share of the mean, against path at {options.reference}
+passes, whose noise is taken off; where path lights all of the object they are its own standard error. Two steps are
+held against each other pixel by pixel: an error rises if it is above the one before by more than {SURE:g} standard
+errors of their difference. Seconds are CPU seconds of the passes without set-up and pilot, and tell apart what differs
+by more than {100 * CLOCK:.0f} % and {1000 * TICK:.0f} ms: frames of fast shaders take 1 to 3 ms at this size. Made by
+`benchmarks/quality.py`.
 
 ![Error against time](images/quality_steps.png)
 
@@ -291,19 +291,23 @@ this size. Made by `benchmarks/quality.py`.
 def _section(name: str, one: Sweeps) -> str:
     """A scene."""
     expected = ", ".join(
-        f"{shader} {100 * error:.2g} % ({100 * one.measured[shader]:.2g} %)" for shader, error in one.predicted.items()
+        f"{shader} {_percent(error)} ({_percent(one.measured[shader])})" for shader, error in one.predicted.items()
     )
     parts = [f"## {name[0].upper()}{name[1:]}\n\nPredicted errors, and as the pilot measured them in "
              f"{one.pilot_seconds:.2g} CPU seconds: {expected}.\n"]  # fmt: skip
     for way, steps in one.steps.items():
         rows = "\n".join(
             f"| {step.quality:.1f} | {', '.join(f'{n} {100 * s:.3g} %' for n, s in step.shares.items())} | "
-            f"{step.passes} | {step.seconds:.2g} | {100 * step.error:.2g} % | {100 * step.tolerance:.2g} % |"
+            f"{step.passes} | {step.seconds:.2g} | {_percent(step.error)} | {_percent(step.tolerance)} |"
             for step in steps
         )
         head = "| quality | shaders | passes | CPU s | error | tolerance |\n|---:|---|---:|---:|---:|---:|"
         parts.append(f"{way.capitalize()}: {verdict(steps)}.\n\n{head}\n{rows}\n")
     return "\n".join(parts)
+
+
+def _percent(share: float) -> str:
+    return f"{100 * share:.0f} %" if share >= 0.1 else f"{100 * share:.2g} %"
 
 
 if __name__ == "__main__":

@@ -20,8 +20,8 @@ from .render import Renderer
 from .shaders.prediction import Error
 from .shaders.selection import Plan, passes_within
 
-FIRST = 4
-"""Passes of the first round: fewer say too little of rare bright samples."""
+FIRST, LEAST = 4, 2
+"""Passes of the first round, at most: fewer say too little of rare bright samples; and at least: one says nothing."""
 SURE = 2.5
 """Standard errors between the square of a measured noise and its bound: with half as many, 1 in 7 pictures would stop
 too soon (``benchmarks/prediction.py``)."""
@@ -54,7 +54,7 @@ def rounds(renderer: Renderer, planned: int) -> Iterator[tuple[int, int]]:
 
 def next_round(done: int, needed: int) -> int:
     """How many passes there are after the next round; ``done`` where there is none."""
-    return max(done, min(needed, max(GROWTH * done, FIRST)))
+    return max(done, min(max(needed, LEAST), max(GROWTH * done, FIRST)))
 
 
 def passes_needed(film: Film, object_id: NDArray, plans: Sequence[Plan]) -> int:

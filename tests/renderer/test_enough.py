@@ -34,6 +34,7 @@ def noisy_film(noise, passes=64, side=40, seed=3):
 
 def test_rounds_grow_fourfold_until_there_are_enough():
     assert next_round(0, 100) == FIRST and next_round(0, 2) == 2
+    assert next_round(0, 1) == 2 == next_round(2, 1)  # a single pass would not tell its noise
     assert next_round(8, 100) == 32 and next_round(8, 11) == 11
     assert next_round(8, 8) == next_round(8, 3) == 8
 
