@@ -228,11 +228,10 @@ class _Chooser:
         warning, error, passes = None, None, fast_passes
         candidates = () if handling == "surface" else self._candidates(thing, look, allowed, wanted == "auto")
         if handling == "surface":
-            shares, reason = {"diffuse": 1.0}, "the mesh encloses no volume, so there is no inside for light"
+            none = "the mesh encloses no volume" if thing.closedness.state == "open" else "only its surface is lit"
+            shares, reason = {"diffuse": 1.0}, f"{none}, so there is no inside for light"
             if wanted != "auto":
-                warning = (
-                    f"{thing.name}: {wanted} needs an inside, and this mesh has none; the diffuse fallback is used"
-                )
+                warning = f"{thing.name}: {wanted} needs an inside, and {none}; the diffuse fallback is used"
         elif wanted != "auto":
             shares, reason = {wanted: 1.0}, "asked for"
         else:

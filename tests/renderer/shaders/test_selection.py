@@ -135,6 +135,13 @@ def test_a_shader_with_hardly_a_share_is_left_out_and_the_shares_still_add_up():
     assert len(shares_of({"diffuse": 0.1, "scalar": 1.0, "plumb": 1.0}, many, 1.1 * near)) == 2
 
 
+def test_a_closed_mesh_whose_surface_alone_is_wanted_is_not_said_to_enclose_nothing():
+    (plan,) = select(ball_at(3), shader="plumb", hole_handling="surface")
+    assert plan.shader == "diffuse"
+    for text in (plan.reason, plan.warning):
+        assert "only its surface is lit" in text and "encloses" not in text
+
+
 # ---- passes from the quality ----
 
 
