@@ -1,6 +1,6 @@
 """Are the predicted errors honest? Judged on cases that the fit has not seen.
 
-    PYTHONPATH=. python benchmarks/prediction.py [--cases N] [--seeds K...] [--folds N] [--meshes FOLDER] [-o FOLDER]
+    PYTHONPATH=. python benchmarks/prediction.py [--cases N...] [--seeds K...] [--folds N] [--meshes FOLDER] [-o FOLDER]
 
 For each case (see ``prediction_cases.py``) and several qualities: is the measured error of the chosen shader within the
 tolerance, and is the predicted error within a factor of 2 of the measured? For path the measured error is the measured
@@ -33,16 +33,18 @@ QUALITIES = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.8)
 def main() -> None:
     """The command."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--cases", type=int, default=106, help="of each seed")
-    parser.add_argument("--seeds", type=int, nargs="+", default=[11, 12])
+    parser.add_argument("--cases", type=int, nargs="+", default=[106], help="of each seed, or one number for all")
+    parser.add_argument("--seeds", type=int, nargs="+", default=[21, 22])
     parser.add_argument("--folds", type=int, default=0, help="0: judge the stored fit")
     parser.add_argument("--meshes", type=Path, help="folder with further meshes, of which it takes those it knows")
     parser.add_argument("--threads", type=int, default=2)
     parser.add_argument("--seconds", type=float, default=0.5, help="of CPU for each half of path's pictures")
     parser.add_argument("-o", "--output", type=Path, default=Path("docs"))
     options = parser.parse_args()
+    counts = options.cases * len(options.seeds) if len(options.cases) == 1 else options.cases
     drawn = (
-        measured_cases(seed, options.cases, options.meshes, options.threads, options.seconds) for seed in options.seeds
+        measured_cases(seed, count, options.meshes, options.threads, options.seconds)
+        for seed, count in zip(options.seeds, counts, strict=True)
     )
     cases = list(chain.from_iterable(drawn))
     figures = judged(cases, folded(cases, options.folds) if options.folds else [fits()] * len(cases))
