@@ -1,6 +1,6 @@
 """Are the predicted errors honest? Judged on cases that the fit has not seen.
 
-    PYTHONPATH=. python benchmarks/prediction.py [--cases N] [--seeds K...] [--folds N] [--meshes FOLDER] [-o FOLDER]
+    PYTHONPATH=. python benchmarks/prediction.py [--cases N...] [--seeds K...] [--folds N] [--meshes FOLDER] [-o FOLDER]
 
 For each case (see ``prediction_cases.py``) and several qualities: is the measured error of the chosen shader within the
 tolerance, and is the predicted error within a factor of 2 of the measured? For path the measured error is the measured
@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import argparse
 import json
+from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
@@ -32,16 +33,18 @@ QUALITIES = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.8)
 def main() -> None:
     """The command."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--cases", type=int, default=106, help="of each seed")
-    parser.add_argument("--seeds", type=int, nargs="+", default=[11, 12])
+    parser.add_argument("--cases", type=int, nargs="+", default=[106], help="of each seed, or one number for all")
+    parser.add_argument("--seeds", type=int, nargs="+", default=[21, 22])
     parser.add_argument("--folds", type=int, default=0, help="0: judge the stored fit")
     parser.add_argument("--meshes", type=Path, help="folder with further meshes, of which it takes those it knows")
     parser.add_argument("--threads", type=int, default=2)
     parser.add_argument("--seconds", type=float, default=0.5, help="of CPU for each half of path's pictures")
     parser.add_argument("-o", "--output", type=Path, default=Path("docs"))
     options = parser.parse_args()
+    counts = options.cases * len(options.seeds) if len(options.cases) == 1 else options.cases
     drawn = (
-        measured_cases(seed, options.cases, options.meshes, options.threads, options.seconds) for seed in options.seeds
+        measured_cases(seed, count, options.meshes, options.threads, options.seconds)
+        for seed, count in zip(options.seeds, counts, strict=True)
     )
     cases = list(chain.from_iterable(drawn))
     figures = judged(cases, folded(cases, options.folds) if options.folds else [fits()] * len(cases))
@@ -132,15 +135,17 @@ def _chosen(case: Case, by: dict[str, Fit], quality: float) -> Judged:
     errors, noise = predicted_errors(case.look, by), predicted_noise(case.look, by)
     shares = shares_of({name: error.bound for name, error in errors.items()}, demand, size)
     shader = max(shares, key=shares.__getitem__)
-    quiet = noise_allowed(allowed, [error.error for error in errors.values()])
-    passes, seen = _passes_of_path(case, noise, quiet)
-    measured = dict(case.measured.errors) | {"path": _scaled(case.measured.noise, passes)}
-    planned = errors | {"path": _scaled(noise, passes_within(noise.bound, quiet))}
-    told = errors | {"path": _scaled(seen, passes)}
-    found, before, after = (sum(share * of[name].error for name, share in shares.items())
-                            for of in (measured, planned, told))  # fmt: skip
-    squared, doubt = (sum(share * getattr(measured[name], what) for name, share in shares.items())
+    by_path = shares.pop("path", 0.0)
+    quiet = noise_allowed(allowed, [error.error for error in errors.values()], by_path)
+    passes, seen = _passes_of_path(case, noise, quiet, by_path)
+    before = _error(errors, shares, noise, by_path / passes_within(by_path**0.5 * noise.bound, quiet))
+    after = _error(errors, shares, seen, by_path / passes)
+    found = _error(case.measured.errors, shares, case.measured.noise, by_path / passes)
+    # what errors add up to is squared, without bias and at most: (sum of s b)^2 <= (sum of s) (sum of s b^2)
+    squared, doubt = (sum(shares.values()) * sum(share * getattr(case.measured.errors[name], what)
+                                                 for name, share in shares.items())
                       for what in ("squared", "doubt"))  # fmt: skip
+    squared += case.measured.noise.error**2 * by_path / passes
     low, high = (max(squared + sign * doubt, 0.0) ** 0.5 for sign in (-1, 1))
     return Judged(
         shader, squared <= allowed**2, low <= allowed, squared - SURE * doubt > allowed**2, before, after, found,
@@ -148,20 +153,21 @@ def _chosen(case: Case, by: dict[str, Fit], quality: float) -> Judged:
     )  # fmt: skip
 
 
-def _passes_of_path(case: Case, planned: Error, allowed: float) -> tuple[int, Error]:
-    """Passes of a render that goes by its own noise, and the noise it has seen."""
-    done, noise = next_round(0, passes_within(planned.bound, allowed)), planned
+def _error(errors: Mapping[str, Error], shares: Mapping[str, float], noise: Error, left: float) -> float:
+    """Of an object: its shaders' by their shares, and of path's variance the part ``left``."""
+    return float(np.hypot(sum(share * errors[name].error for name, share in shares.items()), noise.error * left**0.5))
+
+
+def _passes_of_path(case: Case, planned: Error, allowed: float, share: float) -> tuple[int, Error]:
+    """Passes of a render that goes by its own noise, with a ``share`` of the samples by path, and the noise it has
+    seen."""
+    noise, done = planned, 0
     while True:
-        known = [error for passes, error in case.seen if passes <= done]
-        noise = known[-1] if known else noise
-        following = next_round(done, passes_within(noise.bound, allowed) if known else done)
+        noise = next((error for passes, error in reversed(case.seen) if passes <= share * done), noise)
+        following = next_round(done, passes_within(share**0.5 * noise.bound, allowed))
         if following <= done:
             return done, noise
         done = following
-
-
-def _scaled(noise: Error, passes: int) -> Error:
-    return Error(noise.error * passes**-0.5, noise.bound * passes**-0.5)
 
 
 def _factor_2(ratios: list[float]) -> float:

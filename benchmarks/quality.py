@@ -1,21 +1,22 @@
 """Does the error fall and the time rise with every step of --quality?
 
-    PYTHONPATH=. python benchmarks/quality.py [--size PIXELS] [--steps N] [--most Q] [--reference N] [--work FOLDER]
-                                              [-o FOLDER]
+    PYTHONPATH=. python benchmarks/quality.py [--size PIXELS] [--steps N] [--most Q] [--reference N] [--scenes NAME...]
+                                              [--work FOLDER] [-o FOLDER]
 
-Six scenes. A step is rendered as ``sss-render --quality`` does, in rounds that go by the noise seen. Its error is the
-root mean square over the object's pixels and channels against path at ``--reference`` passes, the reference's own noise
-taken off, over the mean. Where path lights all of it the picture's own standard error is taken, which is surer. Seconds
-are CPU seconds of the passes: set-up is left out, and short renders are repeated, of which the fastest counts.
+Six scenes, each by prediction and with ``--pilot``, whose seconds are told apart. A step is rendered as ``sss-render
+--quality`` does, in rounds that go by the noise seen. Its error is the root mean square over the object's pixels and
+channels against path at ``--reference`` passes, the reference's own noise taken off, over the mean. Where path lights
+all of it the picture's own standard error is taken, which is surer. Seconds are CPU seconds of the passes: set-up is
+left out, and short renders are repeated, of which the fastest counts.
 
 Steps are compared pixel by pixel, so that what they have in common cancels: an error *rises* where the mean square of
 one step is above that of the step before by more than two standard errors of their difference, a time *falls* where it
-is below that of the step before by more than a tenth, what such clocks are good for. A step is *dominated* by another
-that is surely less wrong and surely faster. Steps with the same shares and passes are the same picture.
+is below that of the step before by more than a tenth and 20 ms, what clocks and pictures of a hundred pixels are good
+for. A step is *dominated* by another that is surely less wrong and surely faster.
 
 What was measured is kept in --work, and an interrupted run goes on there; remove it when a shader or the choice of
 shaders has changed. Writes quality_steps.json, quality_steps.md and images/quality_steps.png into FOLDER, docs/ by
-default.
+default, unless only some of the scenes are asked for.
 """
 
 from __future__ import annotations
@@ -31,13 +32,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.dolly import LIGHTS, body
-from renderer.enough import is_by_path, rounds
+from renderer.enough import rounds
 from renderer.output.film import Film
+from renderer.pilot import measure
 from renderer.render import Renderer, Settings
 from renderer.scene.admission import admit
 from renderer.scene.description import EnvironmentLight, Scene
 from renderer.scene.staging import frame_camera
-from renderer.shaders.selection import picture_passes
+from renderer.shaders.appearance import appearance
+from renderer.shaders.prediction import Error, predicted_errors
+from renderer.shaders.selection import Measured, picture_passes
 from renderer.study.drawing import COLOURS, pyplot
 from sss_tools import shapes
 from sss_tools.elephant import elephant
@@ -51,10 +55,11 @@ SCENES = {
     "box of wax, sky": ("wax", lambda: shapes.box((1.0, 0.6, 0.8)), SKY),
     "elephant of jade, sun": ("jade", elephant, LIGHTS),
 }
+WAYS = "by prediction", "with --pilot"
 SURE = 2.0
 """Standard errors of a difference."""
-CLOCK = 0.1
-"""Relative differences of CPU seconds that say nothing."""
+CLOCK, TICK = 0.1, 0.02
+"""Differences of CPU seconds that say nothing: relative, and in seconds. Small pictures are mostly calls."""
 SHORT, REPEATS = 1.0, 50
 """CPU seconds below which renders are repeated, as often."""
 
@@ -81,19 +86,19 @@ class Step:
         """Relative root mean square."""
         return max(float(np.mean(self.squares)), 0.0) ** 0.5
 
-    def same_as(self, other: Step) -> bool:
-        """Whether the picture is the same."""
-        return self.shares == other.shares and self.passes == other.passes
-
     def more_wrong_by(self, other: Step) -> float:
         """How far its mean square is above that of ``other``, in standard errors of the difference."""
         difference = np.subtract(self.squares, other.squares)
         doubt = float(difference.std(ddof=1)) / len(difference) ** 0.5
         return float(difference.mean()) / max(doubt, 1e-30)
 
+    def faster_than(self, other: Step) -> bool:
+        """Whether its seconds are surely fewer."""
+        return self.seconds < (1 - CLOCK) * other.seconds - TICK
+
     def dominated_by(self, other: Step) -> bool:
         """Whether ``other`` is surely less wrong and surely faster."""
-        return self.more_wrong_by(other) > SURE and other.seconds < (1 - CLOCK) * self.seconds
+        return self.more_wrong_by(other) > SURE and other.faster_than(self)
 
 
 def main() -> None:
@@ -103,39 +108,85 @@ def main() -> None:
     parser.add_argument("--steps", type=int, default=11)
     parser.add_argument("--most", type=float, default=1.0, help="highest quality")
     parser.add_argument("--reference", type=int, default=2048, help="passes")
+    parser.add_argument("--scenes", nargs="+", choices=SCENES, default=list(SCENES), metavar="NAME", help="only these")
     parser.add_argument("--work", type=Path, default=Path("out/quality"))
     parser.add_argument("-o", "--output", type=Path, default=Path("docs"))
     options = parser.parse_args()
     options.work.mkdir(parents=True, exist_ok=True)
     found = {}
-    for name in SCENES:
-        found[name] = sweep(name, options)
-        print(name, verdict(found[name]), flush=True)
+    for name in options.scenes:
+        found[name] = sweeps(name, options)
+        print(name, {way: verdict(steps) for way, steps in found[name].steps.items()}, flush=True)
+    if len(found) < len(SCENES):
+        return
     (options.output / "images").mkdir(parents=True, exist_ok=True)
     draw(found, options.output / "images" / "quality_steps.png")
-    figures = {name: [_row(step) for step in steps] for name, steps in found.items()}
+    figures = {
+        name: {
+            "predicted": one.predicted,
+            "measured": one.measured,
+            "pilot_seconds": one.pilot_seconds,
+            "steps": {way: [_row(step) for step in steps] for way, steps in one.steps.items()},
+        }
+        for name, one in found.items()
+    }
     (options.output / "quality_steps.json").write_text(json.dumps(figures, indent=1) + "\n")
     text = markdown(found, options)
     (options.output / "quality_steps.md").write_text(text)
     print(text)
 
 
-def sweep(name: str, options) -> list[Step]:
+@dataclass(frozen=True)
+class Sweeps:
+    """What was found of a scene.
+
+    steps                by ``WAYS``
+    predicted, measured  error of each fast shader: before the render, and by the pilot
+    pilot_seconds        CPU seconds that the pilot took
+    """
+
+    steps: dict[str, list[Step]]
+    predicted: dict[str, float]
+    measured: dict[str, float]
+    pilot_seconds: float
+
+
+def sweeps(name: str, options) -> Sweeps:
     """The steps of one scene, as far as they were measured before from the store."""
     medium, solid, lights = SCENES[name]
     mesh = solid()
     scene = Scene("mm", frame_camera(mesh, (options.size, options.size)), lights, (body(name, medium, mesh),))
     scene = admit(scene)[0]
     stem = f"{name.replace(',', '').replace(' ', '_')}_{options.size}"
-    store = options.work / f"{stem}_{options.reference}.jsonl"
-    steps = [Step(**json.loads(line)) for line in store.read_text().splitlines()] if store.exists() else []
     reference = _reference(scene, options.work / f"{stem}.npz", options.reference)
-    for quality in np.linspace(0, options.most, options.steps)[len(steps) :]:
-        steps.append(measured(scene, round(float(quality), 6), reference))
-        with store.open("a") as file:
-            file.write(json.dumps(asdict(steps[-1])) + "\n")
-        print(name, _row(steps[-1]), flush=True)
-    return steps
+    pilot, seconds = _pilot(scene, options.work / f"{stem}_pilot.json")
+    found = {}
+    for way, known in zip(WAYS, (None, pilot), strict=True):
+        store = options.work / f"{stem}_{options.reference}_{way.split()[-1]}.jsonl"
+        steps = [Step(**json.loads(line)) for line in store.read_text().splitlines()] if store.exists() else []
+        for quality in np.linspace(0, options.most, options.steps)[len(steps) :]:
+            steps.append(measured(scene, round(float(quality), 6), reference, known))
+            with store.open("a") as file:
+                file.write(json.dumps(asdict(steps[-1])) + "\n")
+            print(name, way, _row(steps[-1]), flush=True)
+        found[way] = steps
+    (thing,) = scene.objects
+    predicted = {shader: error.error for shader, error in predicted_errors(appearance(scene, thing)).items()}
+    return Sweeps(
+        found, predicted, {shader: error.error for shader, error in pilot[thing.name].errors.items()}, seconds
+    )
+
+
+def _pilot(scene: Scene, store: Path) -> tuple[dict[str, Measured], float]:
+    """What ``--pilot`` finds, and the CPU seconds that it takes."""
+    (thing,) = scene.objects
+    if not store.exists():
+        start = time.process_time()
+        found = measure(scene, Settings(threads=1))[thing.name]
+        store.write_text(json.dumps(asdict(found) | {"seconds": time.process_time() - start}))
+    known = json.loads(store.read_text())
+    errors = {shader: Error(**error) for shader, error in known["errors"].items()}
+    return {thing.name: Measured(errors, Error(**known["noise"]))}, known["seconds"]
 
 
 def _reference(scene: Scene, store: Path, passes: int) -> Film:
@@ -151,9 +202,9 @@ def _reference(scene: Scene, store: Path, passes: int) -> Film:
     return renderer.film
 
 
-def measured(scene: Scene, quality: float, reference: Film) -> Step:
-    """A step, rendered."""
-    renderer = Renderer(scene, Settings(quality=quality, threads=1))
+def measured(scene: Scene, quality: float, reference: Film, pilot: dict[str, Measured] | None) -> Step:
+    """A step, rendered; ``pilot``: what one found."""
+    renderer = Renderer(scene, Settings(quality=quality, threads=1), measured=pilot)
     renderer.run([0])  # what is built at first use is set-up
     (plan,) = renderer.plans
     taken: list[float] = []
@@ -164,7 +215,7 @@ def measured(scene: Scene, quality: float, reference: Film) -> Step:
             renderer.run(range(renderer.film.passes, passes))
         taken.append(time.process_time() - start)
     film, where = renderer.film, reference.object_pixels()
-    if is_by_path(plan) and film.passes > 1:
+    if set(plan.shares) == {"path"} and film.passes > 1:
         squares = film.stderr()[where] ** 2
     else:
         squares = (film.mean()[where] - reference.mean()[where]) ** 2 - reference.stderr()[where] ** 2
@@ -180,8 +231,7 @@ def rises(steps: list[Step]) -> list[float]:
 
 def falls(steps: list[Step]) -> list[float]:
     """Qualities at which the time is below that of the step before."""
-    pairs = pairwise(steps)
-    return [b.quality for a, b in pairs if not b.same_as(a) and b.seconds < (1 - CLOCK) * a.seconds]
+    return [b.quality for a, b in pairwise(steps) if b.faster_than(a)]
 
 
 def dominated(steps: list[Step]) -> list[float]:
@@ -201,46 +251,63 @@ def _row(step: Step) -> dict:
     return {**{k: v for k, v in asdict(step).items() if k != "squares"}, "error": step.error}
 
 
-def draw(found: dict[str, list[Step]], file: Path) -> None:
+def draw(found: dict[str, Sweeps], file: Path) -> None:
     """Error against time, a line for each scene."""
     plots = pyplot()
-    figure, axes = plots.subplots(figsize=(7, 4.2))
-    for (name, steps), colour in zip(found.items(), COLOURS.values(), strict=False):
-        axes.loglog(
-            [s.seconds for s in steps], [100 * s.error for s in steps], "o-", ms=3, lw=1, color=colour, label=name
-        )
-    axes.set(xlabel="CPU seconds", ylabel="error, %", title="--quality from 0 (left) to 1 (right)")
-    axes.legend()
+    figure, both = plots.subplots(1, 2, figsize=(11, 4.4), sharex=True, sharey=True)
+    for axes, way in zip(both, WAYS, strict=True):
+        for (name, one), colour in zip(found.items(), COLOURS.values(), strict=False):
+            seconds, errors = zip(*((step.seconds, 100 * step.error) for step in one.steps[way]), strict=True)
+            axes.loglog(seconds, errors, "o-", ms=3, lw=1, color=colour, label=name)
+        axes.set(xlabel="CPU seconds", title=f"--quality from 0 (left) to 1 (right), {way}")
+    both[0].set_ylabel("error, %")
+    both[0].legend()
     figure.savefig(file, dpi=130, facecolor="white")
     plots.close(figure)
 
 
-def markdown(found: dict[str, list[Step]], options) -> str:
-    """A table for each scene."""
-    parts = []
-    for name, steps in found.items():
-        rows = "\n".join(
-            f"| {one.quality:.1f} | {', '.join(f'{n} {100 * s:.0f} %' for n, s in one.shares.items())} | "
-            f"{one.passes} | {one.seconds:.2g} | {100 * one.error:.2g} % | {100 * one.tolerance:.2g} % |"
-            for one in steps
-        )
-        parts.append(f"## {name[0].upper()}{name[1:]}: {verdict(steps)}\n\n"
-                     "| quality | shaders | passes | CPU s | error | tolerance |\n|---:|---|---:|---:|---:|---:|\n"
-                     f"{rows}\n")  # fmt: skip
-    good = sum(verdict(steps) == "monotone" for steps in found.values())
+def markdown(found: dict[str, Sweeps], options) -> str:
+    """Two tables for each scene."""
+    good = [sum(verdict(one.steps[way]) == "monotone" for one in found.values()) for way in WAYS]
     return f"""# The steps of --quality
 
-Six scenes, {options.size} pixels square, {options.steps} steps each: in {good} of {len(found)} the error falls and the
-time rises with every step, and none is beaten by another in both. Errors are root mean squares over object pixels and
-channels as a share of the mean, against path at {options.reference} passes, whose noise is taken off; where path lights
-all of the object they are its own standard error. Two steps are held against each other pixel by pixel: an error rises
-if it is above the one before by more than {SURE:g} standard errors of their difference. Seconds are CPU seconds of the
-passes without set-up, and tell apart what differs by {100 * CLOCK:.0f} %. Steps with the same shares and passes are the
-same picture. Made by `benchmarks/quality.py`.
+Six scenes, {options.size} pixels square, {options.steps} steps each. In {good[0]} of {len(found)} by prediction,
+and in {good[1]} with `--pilot`, the error falls and the time rises with every step, and none is beaten by
+another in both. Where that is not so a fast shader is less wrong than predicted: path, which replaces it, is asked for
+no less noise than the prediction says that shader is wrong. A pilot knows better.
+
+Errors are root mean squares over object pixels and channels as a share of the mean, against path at {options.reference}
+passes, whose noise is taken off; where path lights all of the object they are its own standard error. Two steps are
+held against each other pixel by pixel: an error rises if it is above the one before by more than {SURE:g} standard
+errors of their difference. Seconds are CPU seconds of the passes without set-up and pilot, and tell apart what differs
+by more than {100 * CLOCK:.0f} % and {1000 * TICK:.0f} ms: frames of fast shaders take 1 to 3 ms at this size. Made by
+`benchmarks/quality.py`.
 
 ![Error against time](images/quality_steps.png)
 
-{chr(10).join(parts)}"""
+{chr(10).join(_section(name, one) for name, one in found.items())}"""
+
+
+def _section(name: str, one: Sweeps) -> str:
+    """A scene."""
+    expected = ", ".join(
+        f"{shader} {_percent(error)} ({_percent(one.measured[shader])})" for shader, error in one.predicted.items()
+    )
+    parts = [f"## {name[0].upper()}{name[1:]}\n\nPredicted errors, and as the pilot measured them in "
+             f"{one.pilot_seconds:.2g} CPU seconds: {expected}.\n"]  # fmt: skip
+    for way, steps in one.steps.items():
+        rows = "\n".join(
+            f"| {step.quality:.1f} | {', '.join(f'{n} {100 * s:.3g} %' for n, s in step.shares.items())} | "
+            f"{step.passes} | {step.seconds:.2g} | {_percent(step.error)} | {_percent(step.tolerance)} |"
+            for step in steps
+        )
+        head = "| quality | shaders | passes | CPU s | error | tolerance |\n|---:|---|---:|---:|---:|---:|"
+        parts.append(f"{way.capitalize()}: {verdict(steps)}.\n\n{head}\n{rows}\n")
+    return "\n".join(parts)
+
+
+def _percent(share: float) -> str:
+    return f"{100 * share:.0f} %" if share >= 0.1 else f"{100 * share:.2g} %"
 
 
 if __name__ == "__main__":

@@ -48,6 +48,7 @@ class Columns:
         self.count = min(max(_USUAL >> self._bits, 1), _MOST_STRIPS) << self._bits
         self.radiance = np.empty((3, 2 * self.count), np.float32)
         self.first_object, self.first_unknown = np.empty(self.count, np.int16), np.empty(self.count, bool)
+        self._passes = np.zeros(self.count >> self._bits, np.int64)
         self.clear()
 
     def fit(self, longest: int) -> bool:
@@ -71,9 +72,13 @@ class Columns:
         return None if self._emitting is None else self._under_way[self._emitting[0]].strip
 
     @property
-    def strips(self) -> int:
-        """Under way."""
-        return len(self._under_way)
+    def passes(self) -> set[int]:
+        """Numbers of those under way."""
+        return {place.strip.pass_index for place in self._under_way.values()}
+
+    def passes_of(self, column: NDArray[np.int32]) -> NDArray[np.int64]:
+        """(n,) number of the pass that each column (n,) belongs to, branches or not."""
+        return self._passes[(column & (self.count - 1)) >> self._bits]
 
     def oldest(self, step: int) -> tuple[int, float]:
         """Steps and seconds since the oldest strip under way was begun, ``step`` being that of now."""
@@ -86,6 +91,7 @@ class Columns:
         """Make place for a strip, to be emitted."""
         place = heappop(self._free)
         self._under_way[place], self._emitting = _Place(strip, step, time.monotonic()), (place, 0)
+        self._passes[place] = strip.pass_index
         mine = self._columns(place)
         self.radiance[:, mine] = 0
         self.radiance[:, mine.start + self.count : mine.stop + self.count] = 0

@@ -21,6 +21,7 @@ from .optics.dielectric import fresnel_reflectance
 from .scene.beams import beams
 from .scene.camera import CameraRays
 from .scene.coverage import covered_pixels
+from .shaders.blend import Blend, Choices
 from .shaders.fast_body import FastBody, keep_outside
 from .shaders.surface import SurfacePoints, exit_share
 from .strips import NOTHING, Strip, Strips, TracedStrip
@@ -39,19 +40,29 @@ BLOCK = 16384
 Group = TypeVar("Group", Rays, Meeting)
 
 
-def applies_to(scene: TracedScene, bodies: Mapping[int, FastBody]) -> bool:
-    """Whether all objects are lit by fast shaders, and none has a rough boundary."""
-    return len(bodies) == len(scene.objects) and all(
-        body.thing.roughness == 0 or body.optics.ior == 1 for body in bodies.values()
+def applies_to(scene: TracedScene, bodies: Mapping[int, FastBody], blends: Mapping[int, Blend]) -> bool:
+    """Whether all objects are lit by fast shaders, by one or by several, and none has a rough boundary."""
+    lit = [*bodies.values(), *(body for blend in blends.values() for body in blend.bodies)]
+    return len(bodies) + len(blends) == len(scene.objects) and all(
+        body is not None and (body.thing.roughness == 0 or body.optics.ior == 1) for body in lit
     )
 
 
 class Frames:
     """What is the same in all frames of a scene; threads share it."""
 
-    def __init__(self, scene: TracedScene, camera: CameraRays, bodies: Mapping[int, FastBody], seed: int):
-        self.scene, self.bodies, self.seed = scene, bodies, seed
-        self.table = FaceTable(scene, bodies)
+    def __init__(
+        self,
+        scene: TracedScene,
+        camera: CameraRays,
+        bodies: Mapping[int, FastBody],
+        seed: int,
+        blends: Mapping[int, Blend] | None = None,
+    ):
+        self.scene, self.bodies, self.seed, self.blends = scene, bodies, seed, blends or {}
+        # the last one of several looks up most
+        dearest = {index: body for index, blend in self.blends.items() if (body := blend.bodies[-1]) is not None}
+        self.table = FaceTable(scene, {**bodies, **dearest})
         self.look_from(camera)
 
     def look_from(self, camera: CameraRays) -> None:
@@ -128,6 +139,10 @@ class _Frame:
 
     def __init__(self, frames: Frames, uniforms: Uniforms, pass_index: int, pixels: NDArray[np.int64]):
         self._scene, self._camera, self._table, self._bodies = frames.scene, frames.camera, frames.table, frames.bodies
+        self._blends, self._choices = frames.blends, None
+        if frames.blends:
+            self._choices = Choices(frames.blends, len(pixels))
+            self._choices.choose(np.arange(len(pixels)), stream_keys(frames.seed, pass_index, pixels))
         self._seed, self._pass, self._pixels, self._uniforms = frames.seed, pass_index, pixels, uniforms
         self._beams = beams(frames.scene.lights, pass_index)
         # a sample's channels side by side, as the film has them
@@ -191,8 +206,7 @@ class _Frame:
         met = self._table.at(rays)
         thing = self._scene.triangle_object.take(rays.triangle)
         reflectance = np.zeros(len(rays), np.float32)
-        for index, body in self._bodies.items():
-            mine = np.flatnonzero(thing == index)
+        for body, mine in self._lit(thing, rays.sample):
             if len(mine) == len(rays):
                 reflectance = self._scattered(body, rays, met)
             elif len(mine):
@@ -205,6 +219,18 @@ class _Frame:
         origin += met.position
         reflected = Rays(origin, turned, rays.throughput * reflectance, rays.stream, rays.sample)
         return reflected if len(going) == len(rays) else reflected.take(going)
+
+    def _lit(self, thing: NDArray[np.int16], sample: NDArray[np.intp]) -> Iterator[tuple[FastBody, NDArray[np.intp]]]:
+        """Who lights which of the rays that meet the objects ``thing`` (n,)."""
+        for index, body in self._bodies.items():
+            yield body, np.flatnonzero(thing == index)
+        for index, blend in self._blends.items():
+            assert self._choices is not None
+            here = np.flatnonzero(thing == index)
+            chosen = self._choices.of(index, sample[here])
+            for number, one in enumerate(blend.bodies):
+                assert one is not None
+                yield one, here[chosen == number]
 
     def _scattered(self, body: FastBody, rays: Meeting, met: Met) -> Float32:
         """Add the light that leaves ``body`` along rays; the boundary's reflectance (n,) there."""

@@ -20,24 +20,25 @@ from .render import Renderer
 from .shaders.prediction import Error
 from .shaders.selection import Plan, passes_within
 
-FIRST = 4
-"""Passes of the first round: fewer say too little of rare bright samples."""
+FIRST, LEAST = 4, 2
+"""Passes of the first round, at most: fewer say too little of rare bright samples; and at least: one says nothing."""
 SURE = 2.5
 """Standard errors between the square of a measured noise and its bound: with half as many, 1 in 7 pictures would stop
 too soon (``benchmarks/prediction.py``)."""
 GROWTH = 4
 """Passes after a round are at most so many times those before."""
-FEW_PIXELS = 8
+FEW_PIXELS, FEW_PATHS = 8, 32
+"""Fewer pixels without edges, and fewer samples by path, tell nothing."""
 
 
 def rounds(renderer: Renderer, planned: int) -> Iterator[tuple[int, int]]:
     """How many passes the film is to have after each round, and how many are expected in the end.
 
-    planned  what is expected before the first; all there is where path lights no object alone
+    planned  what is expected before the first; all there is where path lights nothing
 
     The film is to have them when the next round is asked for.
     """
-    if not any(is_by_path(plan) for plan in renderer.plans):
+    if not any("path" in plan.shares for plan in renderer.plans):
         yield planned, planned
         return
     needed, done = planned, renderer.film.passes
@@ -53,12 +54,7 @@ def rounds(renderer: Renderer, planned: int) -> Iterator[tuple[int, int]]:
 
 def next_round(done: int, needed: int) -> int:
     """How many passes there are after the next round; ``done`` where there is none."""
-    return max(done, min(needed, max(GROWTH * done, FIRST)))
-
-
-def is_by_path(plan: Plan) -> bool:
-    """Whether path alone lights the object: where others take part, its pixels have no standard error."""
-    return set(plan.shares) == {"path"}
+    return max(done, min(max(needed, LEAST), max(GROWTH * done, FIRST)))
 
 
 def passes_needed(film: Film, object_id: NDArray, plans: Sequence[Plan]) -> int:
@@ -70,22 +66,23 @@ def passes_needed(film: Film, object_id: NDArray, plans: Sequence[Plan]) -> int:
 
 
 def _needed(film: Film, where: NDArray[np.bool_], plan: Plan) -> int:
-    if is_by_path(plan) and not where.any():
+    if plan.noise_allowed is None:
+        return plan.passes
+    if not where.any():
         return 1  # behind others, or out of the picture
-    noise = noise_seen(film, where) if is_by_path(plan) else None
-    return (
-        plan.passes if noise is None or plan.noise_allowed is None else passes_within(noise.bound, plan.noise_allowed)
-    )
+    noise = noise_seen(film, where, plan.shares["path"])
+    return plan.passes if noise is None else passes_within(noise.bound, plan.noise_allowed)
 
 
-def noise_seen(film: Film, where: NDArray[np.bool_]) -> Error | None:
+def noise_seen(film: Film, where: NDArray[np.bool_], share: float = 1.0) -> Error | None:
     """Standard deviation of a camera sample over the mean, root mean square over the pixels ``where`` (h, w) of one
-    object, and what it hardly exceeds; None where too little is known."""
+    object that path lights for a ``share`` of the samples, and what it hardly exceeds; None where too little is
+    known."""
     filled = where & film.object_pixels()
     where = filled if filled.sum() >= FEW_PIXELS else where
-    if film.passes < 2 or where.sum() < 2:
+    if film.passes < 2 or where.sum() < 2 or share * film.passes * where.sum() < FEW_PATHS:
         return None
-    variance = (film.stderr()[where] ** 2 * film.samples()[where][:, None]).mean(axis=1)
+    variance = film.variance()[where].mean(axis=1)
     variance = variance[np.isfinite(variance)]
     mean = float(film.mean()[where].mean())
     if len(variance) < 2 or not mean > 0:

@@ -27,7 +27,8 @@ def guide_arrays(renderer: Renderer, names: list[str]) -> dict[str, NDArray]:
     width, height = camera.resolution
     directions = camera.centre_directions()
     distance, triangle = traced.closest(np.repeat(camera.origin[:, None], directions.shape[1], axis=1), directions)
-    depth = np.where(triangle >= 0, distance * np.float32(traced.frame.scale), np.float32(np.inf))
+    depth = np.full(len(distance), np.inf, np.float32)
+    depth[triangle >= 0] = distance[triangle >= 0] * np.float32(traced.frame.scale)
     normal = np.where(triangle >= 0, traced.triangle_normal[:, triangle], 0)
     errors = [np.nan if plan.predicted_error is None else plan.predicted_error for plan in renderer.plans]
     arrays = {

@@ -99,8 +99,8 @@ class Renderer:
             self._fast_bodies, self._blends = fast_bodies(self.traced, self.plans, width * height, threads, self.stages)
             self.acceleration = _acceleration(self.traced, width * height, self.stages)
             self._frames = None
-            if not self._blends and direct.applies_to(self.traced, self._fast_bodies):
-                self._frames = direct.Frames(self.traced, self.camera, self._fast_bodies, settings.seed)
+            if direct.applies_to(self.traced, self._fast_bodies, self._blends):
+                self._frames = direct.Frames(self.traced, self.camera, self._fast_bodies, settings.seed, self._blends)
             self.shader_id, self.object_id = self._identify()
         self.film = Film.blank(scene.camera.resolution, planned_hash(scene, self.plans), settings.seed)
         self.added = 0

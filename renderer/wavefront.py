@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from .columns import Columns
 from .optics.multiple_importance import power_heuristic
-from .scene.beams import Beam, beams
+from .scene.beams import Beam, beams, change
 from .scene.camera import CameraRays
 from .scene.lights import RectangleSource, SphereSource
 from .shaders.blend import Blend, Choices
@@ -49,8 +49,6 @@ class Wavefront:
     acceleration  what makes walks shorter or cheaper and leaves their mean alone
     blends        the objects that several shaders light, by object index
 
-    With fast bodies or blends, which are lit by other beams in each pass, passes do not overlap.
-
     A path is in one of several places: flying outside, standing on a surface, or in one of the media. Each step
     takes all paths of the fullest place one event further.
     """
@@ -69,14 +67,13 @@ class Wavefront:
         block = max(block, 2)  # a path and its branch
         self._uniforms = Uniforms(block)
         self._tally = Tally()
-        self._columns, self._beams = Columns(block), list[Beam]()
+        self._columns, self._beams = Columns(block), dict[int, list[Beam]]()
         self._places = [self._place(block) for _ in range(2 + scene.media.count)]
         self._outside, self._at_surfaces, *in_media = self._places
         self._flying, self._standing = self._outside.paths, self._at_surfaces.paths
         chosen = acceleration or Acceleration.none(scene.media.count)
         self._walks = [MediumWalk(place, slot, chosen) for slot, place in enumerate(in_media)]
         self._fast_bodies, self._blends = fast_bodies, blends or {}
-        self._beams_of_pass = bool(self._fast_bodies or self._blends)
         self._emitted = self._noted = self._steps = 0
         # how each object answers a ray, for scenes with more than one kind of surface
         self._kind = [thing.shader for thing in scene.objects]
@@ -120,7 +117,6 @@ class Wavefront:
         self._columns.clear()
         self._choices = Choices(self._blends, self._columns.count) if self._blends else None
         self._emitted = self._noted = self._steps = 0
-        self._turn = -1
         for place in self._places:
             place.paths.clear()
 
@@ -148,12 +144,6 @@ class Wavefront:
             if strip is None:
                 return False
             columns.put(strip, self._steps)
-        strip = columns.emitting
-        assert strip is not None
-        if self._beams_of_pass and strip.turn != self._turn:
-            if columns.strips > 1:
-                return False
-            self._turn, self._beams = strip.turn, beams(self.scene.lights, strip.pass_index)
         return True
 
     def _ended(self) -> Iterator[TracedStrip]:
@@ -244,7 +234,21 @@ class Wavefront:
         if body is None:
             meet_boundary(self._at_surfaces, who, faces)
         else:
-            body.meet(self._at_surfaces, who, faces, self._beams)
+            for mine, lights in self._by_beams(body, who):
+                body.meet(self._at_surfaces, who[mine], faces[mine], lights)
+
+    def _by_beams(self, body: FastBody, who: NDArray[np.intp]) -> Iterator[tuple[NDArray[np.intp], list[Beam]]]:
+        """Which of the paths ``who`` that meet ``body`` are lit by which beams: those of their pass."""
+        lights = self.scene.lights
+        of = np.zeros(len(who), np.int64)
+        if change(lights, body.probes):
+            of = self._columns.passes_of(self._standing.sample[who])
+        for number in np.unique(of).tolist():
+            if number not in self._beams:
+                under_way = self._columns.passes
+                self._beams = {one: known for one, known in self._beams.items() if one in under_way}
+                self._beams[number] = beams(lights, number)
+            yield np.flatnonzero(of == number), self._beams[number]
 
     def _note_first(self, index: NDArray[np.intp], thing: NDArray[np.int16]) -> None:
         # of a split path one branch is enough

@@ -169,12 +169,15 @@ class Film:
 
         NaN in pixels with fewer than two samples, and in biased ones.
         """
-        n = self.samples()[..., None]
-        # rounding can leave a few ulps below zero where all samples are equal
-        variance = np.maximum(_ratio(self.sum_of_squares - self.sum * _ratio(self.sum, n), n - 1), 0)
-        error = np.sqrt(_ratio(variance, n))
+        error = np.sqrt(_ratio(self.variance(), self.samples()[..., None]))
         error[self.biased] = np.nan
         return error
+
+    def variance(self) -> Float64:
+        """(h, w, 3) unbiased variance of a camera sample, biased or not; NaN in pixels with fewer than two samples."""
+        n = self.samples()[..., None]
+        # rounding can leave a few ulps below zero where all samples are equal
+        return np.maximum(_ratio(self.sum_of_squares - self.sum * _ratio(self.sum, n), n - 1), 0)
 
     def _repr_png_(self) -> bytes | None:
         """How notebooks show it: the picture so far, as a PNG file would; None before the first pass."""

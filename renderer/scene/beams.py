@@ -89,6 +89,11 @@ def beams(lights: LightSet, pass_index: int) -> list[Beam]:
     return found
 
 
+def change(lights: LightSet, axes: bool) -> bool:
+    """Whether a pass has other beams than the one before; ``axes``: those of constant environments matter."""
+    return bool(lights.rectangles) or any(axes or one.constant is None for one in lights.environments)
+
+
 def rotation(share: NDArray[np.float64]) -> Float32:
     """(3, 3) rotation for three numbers in [0, 1), uniform over rotations where they are uniform.
 

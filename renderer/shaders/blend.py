@@ -58,7 +58,7 @@ class Choices:
             self._chosen[index][samples] = chosen
             self._fast[index][samples] = np.array([body is not None for body in blend.bodies])[chosen]
 
-    def of(self, index: int, sample: NDArray[np.int32]) -> NDArray[np.int8]:
+    def of(self, index: int, sample: NDArray[np.signedinteger]) -> NDArray[np.int8]:
         """(n,) which shader lights the object ``index`` for ``sample`` (n,)."""
         return self._chosen[index][sample % self._count]
 

@@ -71,6 +71,11 @@ class FastBody:
     curvature: Float32 | None
     ambient: Float32 | None = None
 
+    @property
+    def probes(self) -> bool:
+        """Whether it looks along the axes of constant environments."""
+        return self.shader is plumb
+
     def meet(
         self, transport: Transport, index: NDArray[np.intp], triangle: NDArray[np.int32], beams: Sequence[Beam]
     ) -> None:

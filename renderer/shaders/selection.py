@@ -11,8 +11,9 @@ diffuse fallback as they recede. A shader with error b is good enough up to n = 
 frame needs to know the one before; what a share s of them is wrong by, s b, stays below 0.6 e. The errors are those of
 ``prediction``, or measured by pilots.
 
-Where the number of passes is not given it follows as well: as many as path needs for its noise to be within e in nine
-of ten cases. The first passes then tell how many are enough (``renderer.enough``).
+Where the number of passes is not given it follows as well: as many as path needs, in nine of ten cases, for its noise
+to be within e and within the error of the shaders that it replaces (``noise_allowed``). The first passes then tell how
+many are enough (``renderer.enough``).
 """
 
 from __future__ import annotations
@@ -34,6 +35,11 @@ CHEAPEST_FIRST = ("diffuse", "scalar", "plumb", "path")
 FADE = 2.2
 """Factor around a threshold, in sizes or errors, within which both shaders have samples: so wide that shaders a tenth
 apart change an object by less than a hundredth while it recedes by a tenth."""
+LEAST_SHARE = 0.002
+"""A shader with a smaller share of an object's samples is left out: nobody sees it, and something is built for it."""
+ADDED = 0.1
+"""Share of its noise, squared, that path may bring to an object where it begins to take a part in it: it then has
+passes in proportion to its part, and not at once all that it needs to outweigh its noise by the error it takes away."""
 MOST_PASSES = 16384
 """Passes are n / sqrt(1 + (n / this)^2) for the n = (noise / e)^2 that are needed: never more than this, more for every
 higher quality, and not far from enough up to half of it."""
@@ -70,7 +76,7 @@ class Plan:
     tolerance           relative error allowed; None for opaque objects
     shares              of its camera samples that each shader lights: one, or several near a threshold
     passes              that its chosen shaders need, or those given
-    noise_allowed       to path where it lights the object: within the tolerance, and less than others are wrong by
+    noise_allowed       to the mean of its samples, where path lights some of them, see ``noise_allowed``
     candidates          cheapest first; none for opaque objects and those without an inside
     """
 
@@ -140,14 +146,24 @@ def tolerance(quality: float, size_px: float) -> float:
 
 def passes_within(noise: float, allowed: float) -> int:
     """Camera samples a pixel after which their mean is noisy by ``allowed``, see ``MOST_PASSES``."""
-    return math.ceil(1 / math.hypot((allowed / max(noise, 1e-6)) ** 2, 1 / MOST_PASSES) - 1e-9)
+    return max(math.ceil(1 / math.hypot((allowed / max(noise, 1e-6)) ** 2, 1 / MOST_PASSES) - 1e-9), 1)
 
 
-def noise_allowed(allowed: float, others: Sequence[float]) -> float:
-    """The noise that path may have within ``allowed``, where it is chosen over shaders with the errors ``others``: a
-    dearer picture that is noisier than the cheaper one would be wrong is of use to nobody. As many passes as both need
-    together, so that more quality is always more of them."""
-    return 1 / math.hypot(1 / allowed, 1 / min(others, default=math.inf))
+def noise_allowed(allowed: float, others: Sequence[float], share: float = 1.0) -> float:
+    """The noise that an object may have within ``allowed`` where path lights a ``share`` of its samples, chosen over
+    shaders with the errors ``others``.
+
+    A dearer picture that is noisier than the cheaper one would be wrong is of use to nobody. So the noise r is within
+    ``allowed`` and below the least of the others in the end, as many passes as both need together, so that more quality
+    is always more of them. While others light a share s of the samples it is within
+
+        r sqrt(1 - s^2),
+
+    which with their own error, s times as large, is no more than that error was: as s falls the whole never rises, but
+    for ``ADDED`` at the beginning.
+    """
+    least = 1 / math.hypot(1 / allowed, 1 / min(others, default=math.inf))
+    return least * math.sqrt(1 - (1 - ADDED) * (1 - share) ** 2)
 
 
 def picture_passes(plans: Sequence[Plan]) -> int:
@@ -212,22 +228,25 @@ class _Chooser:
         warning, error, passes = None, None, fast_passes
         candidates = () if handling == "surface" else self._candidates(thing, look, allowed, wanted == "auto")
         if handling == "surface":
-            shares, reason = {"diffuse": 1.0}, "the mesh encloses no volume, so there is no inside for light"
+            none = "the mesh encloses no volume" if thing.closedness.state == "open" else "only its surface is lit"
+            shares, reason = {"diffuse": 1.0}, f"{none}, so there is no inside for light"
             if wanted != "auto":
-                warning = (
-                    f"{thing.name}: {wanted} needs an inside, and this mesh has none; the diffuse fallback is used"
-                )
+                warning = f"{thing.name}: {wanted} needs an inside, and {none}; the diffuse fallback is used"
         elif wanted != "auto":
             shares, reason = {wanted: 1.0}, "asked for"
         else:
             bounds = {one.shader: one.error_bound for one in candidates}
             shares = shares_of(bounds, self.demand, look.size_px, _fades(thing))
             reason = self._reason(shares, candidates, allowed, look.size_px)
-        quiet = noise_allowed(allowed, [one.predicted_error for one in candidates[:-1]] if wanted == "auto" else [])
+        quiet = None
         if candidates:
-            chosen = [(shares[one.shader], one) for one in candidates if one.shader in shares]
-            error = sum(share * one.predicted_error for share, one in chosen)
-            passes = math.ceil(sum(share * one.passes for share, one in chosen) - 1e-9)
+            noise, by_path = self._noise(thing, look), shares.get("path", 0.0)
+            if by_path:
+                others = [one.predicted_error for one in candidates[:-1]] if wanted == "auto" else []
+                quiet = noise_allowed(allowed, others, by_path)
+                passes = self.passes or max(fast_passes, passes_within(by_path**0.5 * noise.bound, quiet))
+            wrong = sum(shares.get(one.shader, 0.0) * one.predicted_error for one in candidates[:-1])
+            error = math.hypot(wrong, noise.error * (by_path / passes) ** 0.5)
         return Plan(
             name=thing.name,
             state=thing.closedness.state,
@@ -249,7 +268,7 @@ class _Chooser:
     def _candidates(self, thing: SceneObject, look: Appearance, allowed: float, free: bool) -> tuple[Candidate, ...]:
         found = self.measured.get(thing.name)
         errors = found.errors if found else predicted_errors(look)
-        noise = found.noise if found else predicted_noise(look)
+        noise = self._noise(thing, look)
         quiet = noise_allowed(allowed, [error.error for error in errors.values()] if free else [])
         candidates = []
         for name in CHEAPEST_FIRST:
@@ -260,13 +279,18 @@ class _Chooser:
             candidates.append(Candidate(name, error.error, error.bound, passes, seconds, found is not None))
         return tuple(candidates)
 
+    def _noise(self, thing: SceneObject, look: Appearance) -> Error:
+        """Of a camera sample of path."""
+        found = self.measured.get(thing.name)
+        return found.noise if found else predicted_noise(look)
+
     def _reason(self, shares: dict[str, float], candidates: tuple[Candidate, ...], allowed: float, size_px: float):
         by_name = {one.shader: one for one in candidates}
         where = f"tolerance {100 * allowed:.2g} % at {size_px:.3g} pixels and {self.demand}"
         how = "measured by a pilot to be" if candidates[0].measured else "predicted"
         chosen = max(shares, key=shares.__getitem__)
         if len(shares) > 1:
-            mixture = ", ".join(f"{100 * share:.2g} % of the samples by {name}" for name, share in shares.items())
+            mixture = ", ".join(f"{100 * share:.3g} % of the samples by {name}" for name, share in shares.items())
             where = f"near a threshold: {mixture}; {where}"
         if chosen == "path":
             best = min(candidates[:-1], key=lambda one: one.error_bound)
@@ -287,7 +311,9 @@ def shares_of(bounds: Mapping[str, float], demand: Demand, size_px: float, fade:
         if enough > taken:
             shares[name] = enough - taken
             taken = enough
-    return shares
+    kept = {name: share for name, share in shares.items() if share >= LEAST_SHARE}
+    whole = sum(kept.values())
+    return {name: share / whole for name, share in kept.items()} if len(kept) < len(shares) else shares
 
 
 def _fades(thing: SceneObject) -> bool:

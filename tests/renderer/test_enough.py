@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from renderer.enough import FIRST, is_by_path, next_round, noise_seen, passes_needed
+from renderer.enough import FEW_PATHS, FIRST, next_round, noise_seen, passes_needed
 from renderer.job import Budget, execute
 from renderer.output.film import Film
 from renderer.render import Renderer, Settings
@@ -34,6 +34,7 @@ def noisy_film(noise, passes=64, side=40, seed=3):
 
 def test_rounds_grow_fourfold_until_there_are_enough():
     assert next_round(0, 100) == FIRST and next_round(0, 2) == 2
+    assert next_round(0, 1) == 2 == next_round(2, 1)  # a single pass would not tell its noise
     assert next_round(8, 100) == 32 and next_round(8, 11) == 11
     assert next_round(8, 8) == next_round(8, 3) == 8
 
@@ -59,21 +60,22 @@ def test_less_that_is_seen_is_a_higher_bound():
 def test_nothing_is_told_where_nothing_is_seen():
     film = noisy_film(0.7)
     assert noise_seen(film, np.zeros((40, 40), bool)) is None
-    film.biased[:] = True
-    assert noise_seen(film, np.ones((40, 40), bool)) is None
+    two = np.arange(1600).reshape(40, 40) < 2
+    assert noise_seen(film, two) is not None
+    assert noise_seen(film, two, share=0.9 * FEW_PATHS / 128) is None
 
 
 def test_the_most_demanding_object_decides_and_fast_shaders_keep_their_plan():
     renderer = Renderer(ball_scene(shader="path"), Settings(quality=0.7, threads=1))
     (plan,) = renderer.plans
-    assert is_by_path(plan)
+    assert plan.shares == {"path": 1.0}
     film, everywhere = noisy_film(0.7, side=20), np.zeros((20, 20), int)
     told = passes_needed(film, everywhere, [plan])
     assert told == passes_within(noise_seen(film, everywhere == 0).bound, plan.tolerance)
     assert passes_needed(film, everywhere, [plan, replace(plan, noise_allowed=plan.tolerance / 100)]) == told
     demanding = replace(plan, noise_allowed=plan.tolerance / 2)
     assert passes_needed(film, everywhere, [demanding]) > 3 * told
-    fast = replace(plan, shares={"plumb": 1.0}, passes=5 * told)
+    fast = replace(plan, shares={"plumb": 1.0}, noise_allowed=None, passes=5 * told)
     assert passes_needed(film, everywhere, [fast]) == 5 * told
 
 
@@ -93,6 +95,19 @@ def test_a_render_by_quality_stops_when_its_noise_is_within_the_tolerance(tmp_pa
     again = Renderer(of, Settings(quality=0.35, threads=2))
     other = execute(again, tmp_path / "b.npz", Budget(last=film.passes)).film
     assert np.array_equal(film.sum, other.sum)
+
+
+def test_objects_near_a_threshold_go_by_the_noise_of_their_samples_too(tmp_path):
+    """Scalar for some and path for others, of which the pixels show as much noise as there is, whoever made it."""
+    of = ball_scene()
+    renderer = Renderer(of, Settings(quality=0.45, threads=1))
+    (plan,) = renderer.plans
+    assert 0.05 < plan.shares["path"] < 0.95
+    film = execute(renderer, tmp_path / "a.npz", Budget(last=plan.passes, by_noise=True)).film
+    seen = noise_seen(film, renderer.object_id == 0, plan.shares["path"])
+    assert film.passes != plan.passes
+    assert seen.bound / film.passes**0.5 <= 1.01 * plan.noise_allowed
+    assert film.passes <= 2 * passes_within(seen.bound, plan.noise_allowed)
 
 
 def test_where_no_object_is_lit_by_path_the_plan_stands(tmp_path):

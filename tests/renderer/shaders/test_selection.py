@@ -1,5 +1,6 @@
 """Which shader for which object."""
 
+import math
 from dataclasses import replace
 from itertools import pairwise
 
@@ -12,14 +13,18 @@ from renderer.shaders import prediction
 from renderer.shaders.appearance import Appearance, appearance, pixel_footprint
 from renderer.shaders.prediction import Error, predicted_errors
 from renderer.shaders.selection import (
+    ADDED,
     CHEAPEST_FIRST,
     FADE,
+    LEAST_SHARE,
     MOST_PASSES,
     Demand,
     Measured,
+    noise_allowed,
     passes_within,
     picture_passes,
     select,
+    shares_of,
     tolerance,
 )
 from sss_tools import shapes
@@ -119,6 +124,24 @@ def test_the_noise_of_path_is_predicted_for_the_passes_there_will_be():
     assert noise.bound / plan.passes**0.5 <= 1.01 * plan.tolerance
 
 
+def test_a_shader_with_hardly_a_share_is_left_out_and_the_shares_still_add_up():
+    """Nothing is built for one sample in a thousand."""
+    many = Demand(0.5)
+    for size in np.geomspace(1, 1000, 200):
+        shares = shares_of({"diffuse": 0.1, "scalar": 0.0999, "plumb": 0.06}, many, size)
+        assert min(shares.values()) >= LEAST_SHARE and sum(shares.values()) == pytest.approx(1)
+    near = 64 / (0.1 / tolerance(0.5, math.inf) - 1) / FADE
+    assert shares_of({"diffuse": 0.1, "scalar": 1.0, "plumb": 1.0}, many, 1.01 * near) == {"diffuse": 1.0}
+    assert len(shares_of({"diffuse": 0.1, "scalar": 1.0, "plumb": 1.0}, many, 1.1 * near)) == 2
+
+
+def test_a_closed_mesh_whose_surface_alone_is_wanted_is_not_said_to_enclose_nothing():
+    (plan,) = select(ball_at(3), shader="plumb", hole_handling="surface")
+    assert plan.shader == "diffuse"
+    for text in (plan.reason, plan.warning):
+        assert "only its surface is lit" in text and "encloses" not in text
+
+
 # ---- passes from the quality ----
 
 
@@ -147,6 +170,24 @@ def test_path_is_not_chosen_to_be_noisier_than_others_are_wrong():
     assert plan.predicted_error == pytest.approx(plan.noise_allowed, rel=0.02)
     (asked,) = select(ball_at(3), shader="path", target_error=0.2, measured=found)
     assert asked.noise_allowed == pytest.approx(0.2) and asked.passes < plan.passes / 10
+
+
+def test_noise_is_outweighed_by_the_error_that_path_takes_away():
+    """Scalar is 5 % wrong; what is told falls to that of path, rising at most by a twentieth at the beginning."""
+    told = [math.hypot((1 - share) * 0.05, noise_allowed(0.2, [0.3, 0.05], share)) for share in np.linspace(0, 1, 11)]
+    assert all(b <= a for a, b in pairwise(told))
+    assert told[0] < 0.05 * math.sqrt(1 + ADDED) and 0.04 < told[-1] < 0.05
+    assert 0.018 < noise_allowed(0.02, [0.3, 0.05]) < 0.02
+
+
+def test_more_quality_is_told_to_be_less_wrong_and_never_takes_fewer_passes():
+    for distance in (4, 40):
+        of = ball_at(distance)
+        plans = [select(of, quality)[0] for quality in np.linspace(0, 1, 101)]
+        assert {name for plan in plans for name in plan.shares} >= {"scalar", "path"}
+        assert all(b.passes >= a.passes for a, b in pairwise(plans))
+        errors = [plan.predicted_error for plan in plans]
+        assert all(b <= 1.05 * a for a, b in pairwise(errors)) and errors[-1] < errors[0] / 5
 
 
 def test_the_picture_has_the_passes_of_its_most_demanding_object():
