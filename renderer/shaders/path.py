@@ -26,7 +26,7 @@ from ..optics.phase import around, henyey_greenstein, sample_henyey_greenstein, 
 from ..tracing.acceleration import Acceleration
 from ..tracing.distance_grid import Scratch
 from ..tracing.paths import CHANCE, Paths
-from ..tracing.roulette import play_at_collisions
+from ..tracing.roulette import play_at_collisions, walks_are_long
 from ..tracing.traced_scene import MISS
 from ..tracing.transport import Transport
 from .lost_paths import lose
@@ -66,6 +66,7 @@ class MediumWalk:
         # rounded positions on a flat side of the box are not outside
         self._centre = (thing.lower + thing.upper) / 2
         self._half = (thing.upper - thing.lower) / 2 + RAY_OFFSET
+        self._long_walks = walks_are_long(float(self._half.min() * self._sigma_t.max()), float(self._g))
         self._flight, self._bound = np.empty((2, capacity), np.float32)
         self._turned = np.empty((3, capacity), np.float32)
         self._scratch = Scratch(capacity)
@@ -119,7 +120,7 @@ class MediumWalk:
             light_through_facets(self.transport, collided.nonzero()[0], self.slot)
         if self._rough_light is not None:
             self._rough_light.light(collided.nonzero()[0])
-        play_at_collisions(paths, self._uniforms)
+        play_at_collisions(paths, self._uniforms, self._long_walks)
         paths.bury()
 
     def _density(self, index: NDArray[np.intp] | slice, direction: Float32) -> Float32:

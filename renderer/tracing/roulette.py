@@ -13,10 +13,16 @@ LASTING = np.float32(0.9)
 MANY_STEPS = 2**14
 
 
-def play_at_collisions(paths: Paths, uniforms: Uniforms) -> None:
+def walks_are_long(inradius: float, g: float) -> bool:
+    """Whether walks in a body of so many mean free paths, at most, may take more than ``MANY_STEPS``: the slowest ones
+    in a ball, by diffusion, end at a rate of one in 3 (1 - g) (R / pi)^2 steps."""
+    return 3 * (1 - g) * (inradius / np.pi) ** 2 > MANY_STEPS
+
+
+def play_at_collisions(paths: Paths, uniforms: Uniforms, long_walks: bool) -> None:
     """Paths below their threshold f survive with probability w/(2 f), w their largest channel, then weigh 2 f.
 
-    So do, in a step in media, half of those with so many steps behind them as ``MANY_STEPS`` or a power of two times
+    So do, where walks are long, half of those with so many steps behind them as ``MANY_STEPS`` or a power of two times
     that: a walk that sets out from the surface of a white body takes more than n steps with a probability in proportion
     to 1/sqrt(n), until n is the square of the body's size in mean free paths. All would wait for the last, which takes
     millions in a large body. Where a share s of the paths has ``MANY_STEPS``, weights then have a variance of
@@ -26,7 +32,7 @@ def play_at_collisions(paths: Paths, uniforms: Uniforms) -> None:
     largest = np.maximum.reduce(paths.throughput, axis=0)
     index = ((largest < paths.faint) & ~paths.flies_on).nonzero()[0]
     _survive(paths, uniforms, index, largest[index] / (2 * paths.faint[index]))
-    long = (paths.steps >= MANY_STEPS).nonzero()[0]
+    long = (paths.steps >= MANY_STEPS).nonzero()[0] if long_walks else index[:0]
     if len(long):
         long = long[(paths.steps[long] & (paths.steps[long] - 1)) == 0]
         _survive(paths, uniforms, long, np.full(len(long), np.float32(0.5)))
