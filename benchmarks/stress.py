@@ -498,7 +498,8 @@ def markdown(rows: dict[str, dict]) -> tuple[str, bool]:
         "# The path shader at the ends of its range",
         "",
         f"How each case is judged, and what that is blind to, is said in `benchmarks/stress.py`. Bodies are one unit "
-        f"large, renders last some seconds. {len(rows)} of {len(CASES)} cases were measured. Family-wise false-alarm rate {FAMILY:g}. {about['processor']}, "
+        f"large, renders last some seconds. {len(rows)} of {len(CASES)} cases were measured. "
+        f"Family-wise false-alarm rate {FAMILY:g}. {about['processor']}, "
         f"{about['threads']} threads; Python {about['python']}, NumPy {about['numpy']}, embreex {about['embreex']}.",
         "",
         "| case | set-up s | first pass s | passes | MB | leaks | found | good |",
