@@ -46,7 +46,8 @@ LEAST_SAMPLES = 20
 KEEP_EVERY = 300.0
 """Seconds between the times at which the samples so far are written."""
 LOOKS = 5
-"""At how many threads there are: one that was joined takes a moment to leave the system, and is none that stays."""
+"""At each count, of which the least is meant: a thread that was joined, or a connection that was closed, takes a moment
+to leave the system, and is none that stays."""
 MEMORY = {
     "command": "memory of the process, MB",
     "workers": "memory of two cluster workers, MB",
@@ -200,17 +201,20 @@ def sample(start: float, job: str, cluster: LocalCluster, scratch: Path) -> Samp
         workers=sum(worker.memory_info().rss for worker in workers),
         checkers=sum(checker.memory_info().rss for checker in checkers),
         scheduler=scheduler.memory_info().rss,
-        files=sum(process.num_fds() for process in (here, *workers)),
-        threads=min(_threads(here, *workers) for _ in range(LOOKS)),
-        children=len(here.children(recursive=True)),
+        files=_least(lambda: sum(process.num_fds() for process in (here, *workers))),
+        threads=_least(lambda: sum(process.num_threads() for process in (here, *workers))),
+        children=_least(lambda: len(here.children(recursive=True))),
         temporary=sum(1 for _ in scratch.rglob("*")),
         load=os.getloadavg()[0],
     )
 
 
-def _threads(*processes: psutil.Process) -> int:
-    time.sleep(0.02)
-    return sum(process.num_threads() for process in processes)
+def _least(count: Callable[[], int]) -> int:
+    least = count()
+    for _ in range(LOOKS - 1):
+        time.sleep(0.02)
+        least = min(least, count())
+    return least
 
 
 def soak(minutes: float, keep: Callable[[list[Sample]], None]) -> list[Sample]:
