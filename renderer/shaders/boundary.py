@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable
+
 import numpy as np
 from numpy.typing import NDArray
 
 from ..optics.dielectric import fresnel_reflectance
 from ..optics.microfacet import sample_visible_facet, unmasked
+from ..scene.lights import Illumination
 from ..tracing.paths import CHANCE, OUTSIDE, REFLECTS, REFRACTS, WHOLE, Paths
 from ..tracing.streams import branch_streams
 from ..tracing.traced_scene import TracedScene, offset_from
@@ -19,6 +22,7 @@ from .lost_paths import lose
 from .point_light import light_rough, turned_density
 
 Float32 = NDArray[np.float32]
+Arriving = Callable[..., Iterable[Illumination]]
 
 
 def split(scene: TracedScene, paths: Paths, samples: int, choices: Choices | None = None) -> None:
@@ -171,8 +175,11 @@ def _scatter_rough(
     view = frame.to_local(-at.direction)
     if scene.lights.points or scene.lights.sampled:
         # of a path that was split, one branch speaks for both
-        speaks = np.flatnonzero(paths.branch[at.index] != REFLECTS)
-        _light(transport, at.take(speaks), frame.take(speaks), view[:, speaks])
+        speaks = paths.branch[at.index] != REFLECTS
+        before = _lit_before(transport, at)
+        _light(transport, at, frame, view, speaks & ~before, arriving)
+        if scene.lights.sampled:
+            _light(transport, at, frame, view, speaks & before, arriving_from_areas)
     facet = sample_visible_facet(view, alpha, u1, u2)
     share = _reflected_share(scene, at.slot)
     turned, reflected = _turn(-view, facet, at.eta, choice, paths, at.index, share)
@@ -189,17 +196,22 @@ def _scatter_rough(
     return frame.to_world(turned), reflected, density
 
 
-def _light(transport: Transport, at: Crossings, frame: LocalFrame, view: Float32) -> None:
-    """Connect lights to rough boundary points, but for those that the paths' last collisions were connected to."""
-    scene, paths = transport.scene, transport.paths
-    lit = np.array([*(lit.rough for lit in scene.lit_collisions), False])
-    before = lit[at.before] & ~paths.flies_on[at.index]
-    for some, lights in ((~before, arriving), (before, arriving_from_areas)):
-        which = np.flatnonzero(some)
-        if len(which):
-            here = at.take(which)
-            beams = lights(transport, here.index, here.position, skies=True)
-            light_rough(transport, here, frame.take(which), view[:, which], beams)
+def _lit_before(transport: Transport, at: Crossings) -> NDArray[np.bool_]:
+    """(n,) whether paths come straight from a collision that lights without extent were connected to through a rough
+    boundary."""
+    rough = np.array([*(lit.rough for lit in transport.scene.lit_collisions), False])
+    return rough[at.before] & ~transport.paths.flies_on[at.index]
+
+
+def _light(
+    transport: Transport, at: Crossings, frame: LocalFrame, view: Float32, some: NDArray[np.bool_], lights: Arriving
+) -> None:
+    """Connect ``lights`` to those rough boundary points that ``some`` (n,) marks."""
+    which = np.flatnonzero(some)
+    if len(which):
+        here = at.take(which)
+        beams = lights(transport, here.index, here.position, skies=True)
+        light_rough(transport, here, frame.take(which), view[:, which], beams)
 
 
 def _keep_side(turned: Float32, near_normal: Float32, reflected: NDArray[np.bool_]) -> NDArray[np.intp]:

@@ -32,10 +32,9 @@ def play_at_collisions(paths: Paths, uniforms: Uniforms, long_walks: bool) -> No
     largest = np.maximum.reduce(paths.throughput, axis=0)
     index = ((largest < paths.faint) & ~paths.flies_on).nonzero()[0]
     _survive(paths, uniforms, index, largest[index] / (2 * paths.faint[index]))
-    long = (paths.steps >= MANY_STEPS).nonzero()[0] if long_walks else index[:0]
-    if len(long):
-        long = long[(paths.steps[long] & (paths.steps[long] - 1)) == 0]
-        _survive(paths, uniforms, long, np.full(len(long), np.float32(0.5)))
+    if long_walks:
+        due = ((paths.steps >= MANY_STEPS) & (paths.steps & (paths.steps - 1) == 0)).nonzero()[0]
+        _survive(paths, uniforms, due, np.full(len(due), np.float32(0.5)))
 
 
 def play_at_surfaces(paths: Paths, uniforms: Uniforms) -> None:
