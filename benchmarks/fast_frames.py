@@ -19,7 +19,6 @@ import sys
 import time
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -27,7 +26,7 @@ import numpy as np
 from first_figures import machine
 
 from renderer.render import Renderer, Settings
-from renderer.scene.description import Scene, Translucent
+from renderer.scene.description import Scene
 from renderer.scene.staging import stage_mesh
 from renderer.study.steadiness import change, displaced, finer, turned
 from sss_tools.elephant import elephant
@@ -69,9 +68,7 @@ def main() -> None:
 
 def staged(mesh: Mesh, size: int) -> Scene:
     """The scene that is measured."""
-    scene = stage_mesh(mesh, size=(size, size))
-    medium = Medium.from_albedo(0.9, 1 / (0.02 * mesh.longest_side), ior=1.5)
-    return replace(scene, objects=(replace(scene.objects[0], material=Translucent(medium)),), hash="")
+    return stage_mesh(mesh, Medium.from_albedo(0.9, 1 / (0.02 * mesh.longest_side), ior=1.5), (size, size))
 
 
 def _frames(scene: Scene, threads: int, runs: int, clock: Callable[[], float]) -> dict[str, float]:

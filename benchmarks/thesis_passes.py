@@ -12,13 +12,11 @@ from __future__ import annotations
 import argparse
 import statistics
 import time
-from dataclasses import replace
 from pathlib import Path
 
 from first_figures import machine
 
 from renderer.render import Renderer, Settings
-from renderer.scene.description import Translucent
 from renderer.scene.staging import stage_mesh
 from sss_tools.elephant import elephant
 from sss_tools.loading import load_mesh
@@ -38,10 +36,8 @@ def main() -> None:
     options = parser.parse_args()
     mesh = load_mesh(options.mesh) if options.mesh else elephant()
     medium = Medium.from_albedo(0.6, 1 / (0.02 * mesh.longest_side), ior=1.5)
-    scene = stage_mesh(mesh, size=SIZE)
-    scene = replace(scene, objects=(replace(scene.objects[0], material=Translucent(medium)),), hash="")
     started = time.perf_counter()
-    renderer = Renderer(scene, Settings(shader="path", threads=2))
+    renderer = Renderer(stage_mesh(mesh, medium, SIZE), Settings(shader="path", threads=2))
     setup = time.perf_counter() - started
     singly = [_seconds(renderer, range(k, k + 1)) for k in range(RUNS + 1)][1:]
     many = _seconds(renderer, range(RUNS + 1, RUNS + 1 + options.passes))

@@ -80,10 +80,10 @@ def main() -> None:
 
 def ready(mesh, albedo: float, mean_free_path: float, roughness: float = 0.0, lights=None):
     """The scene as the tracer sees it, and its camera; ``lights`` in place of the sky and the rectangle."""
-    staged = stage_mesh(mesh, size=SIZE)
     medium = Medium.from_albedo(albedo, 1 / (mean_free_path * mesh.longest_side), ior=1.5)
+    staged = stage_mesh(mesh, medium, SIZE)
     body = replace(staged.objects[0], material=Translucent(medium, roughness))
-    scene = replace(staged, objects=(body,), lights=lights or staged.lights, hash="")
+    scene = replace(staged, objects=(body,), lights=lights or staged.lights)
     traced = TracedScene(scene, ["path"], ["strict"])
     return traced, CameraRays(scene.camera, traced.frame)
 
@@ -109,7 +109,7 @@ def measure(mesh, albedo: float, mean_free_path: float, passes: int) -> dict:
     }
     rows = {name: way_measured(traced, camera, way, passes) for name, way in ways.items()}
     for row in rows.values():
-        row["gain"] = row["speed"] / row["noise"] ** 2 * rows["plain"]["noise"] ** 2 / rows["plain"]["speed"]
+        row["gain"] = gain(row, rows["plain"])
     return {"albedo": albedo, "mean_free_path": mean_free_path, "grid_seconds": grid_seconds,
             "tables_seconds": tables_seconds, "chosen": describe(chosen), "ways": rows}  # fmt: skip
 
@@ -124,8 +124,12 @@ def connected(mesh, albedo: float, mean_free_path: float, roughness: float, sun:
             traced.lit_collisions = [replace(lit, rough=False) for lit in traced.lit_collisions]
         rows.append(way_measured(traced, camera, Acceleration.chosen(traced, 250_000), passes))
     row, alone = rows
-    gain = row["speed"] / row["noise"] ** 2 * alone["noise"] ** 2 / alone["speed"]
-    return {**row, "alone": alone, "gain": gain}
+    return {**row, "alone": alone, "gain": gain(row, alone)}
+
+
+def gain(row: dict, over: dict) -> float:
+    """How much less CPU time the same noise of a picture takes."""
+    return row["speed"] / row["noise"] ** 2 * over["noise"] ** 2 / over["speed"]
 
 
 def passes_of(tracer: Wavefront, passes: range) -> tuple[list[WholePass], Tally]:

@@ -13,12 +13,11 @@ from collections.abc import Callable, Iterable
 import numpy as np
 from numpy.typing import NDArray
 
-from ..optics.free_flight import exponential
 from ..optics.microfacet import turning, unmasked
 from ..optics.phase import henyey_greenstein
 from ..scene.lights import Illumination
+from ..tracing.depth_roulette import drawn_depth
 from ..tracing.paths import REFLECTS, REFRACTS, Paths
-from ..tracing.shadow import FREE_DEPTH
 from ..tracing.shadow import transmittance as shadow_transmittance
 from ..tracing.transport import Transport
 from .crossings import Crossings
@@ -61,9 +60,8 @@ def light_collisions(
             continue
         who, light = index[some], pick(light, some)
         u, _ = transport.draw(who)
-        deepest = FREE_DEPTH + exponential(u, np.empty_like(u))
         visible = shadow_transmittance(
-            scene, position[:, some], light, paths.inside[:, who], paths.owner[who], transport.tally, deepest
+            scene, position[:, some], light, paths.inside[:, who], paths.owner[who], transport.tally, drawn_depth(u)
         )
         transport.add(who, light.irradiance * (weight * visible / (ior * ior)))
 

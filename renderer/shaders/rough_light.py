@@ -18,14 +18,12 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..optics.free_flight import exponential
 from ..optics.microfacet import sample_visible_facet, turning
 from ..optics.phase import around, henyey_greenstein, sample_henyey_greenstein, spherical
 from ..scene.lights import DirectionalSource, PointSource
+from ..tracing import depth_roulette
 from ..tracing.distance_grid import DistanceGrid, Scratch
 from ..tracing.paths import Paths
-from ..tracing.shadow import FREE_DEPTH
-from ..tracing.traced_scene import MISS
 from ..tracing.transport import Transport
 from .crossings import Crossings
 from .local_frame import LocalFrame
@@ -58,8 +56,7 @@ class RoughLight:
         if not len(index):
             return
         u, _ = self.transport.draw(index)
-        # light from deeper is given up by chance, and what is left stands for it
-        limit = (FREE_DEPTH + exponential(u, np.empty_like(u))) / max(self._sigma_t.min(), 1 / MISS)
+        limit = depth_roulette.reach(self._sigma_t.min(), depth_roulette.drawn_depth(u))
         if self._grid is not None:
             position = self.transport.paths.origin[:, index]
             near = np.flatnonzero(self._grid.distance(position, self._bound[: len(index)], self._scratch) < limit)
@@ -83,8 +80,7 @@ class RoughLight:
         ends.append(transport.paths, index[met])
         ends.origin[:] = scene.on_plane(position[:, met] + distance * direction, triangle)
         ends.direction[:] = direction
-        depth = self._sigma_t * distance
-        depth -= np.maximum(self._sigma_t.min() * distance - FREE_DEPTH, 0)
+        depth = self._sigma_t * distance - depth_roulette.taken(self._sigma_t.min(), distance)
         ends.throughput *= np.exp(-depth) * (phase[met] / density[met])
         at = Crossings.of(scene, ends, np.arange(len(met)), triangle)
         bends = (at.eta != 1) & ~at.contradictory(scene)

@@ -8,16 +8,13 @@ from numpy.typing import NDArray
 from sss_tools.rays import RAY_OFFSET
 
 from ..scene.lights import Illumination
-from .media import MediaTable
+from . import depth_roulette
 from .tally import Tally
 from .traced_scene import MISS, TracedScene, offset_from
 
 Float32 = NDArray[np.float32]
 _SHORT_OF_LIGHT = np.float32(1 - 1e-5)
 """Shadow rays end before the light's own geometry: a relative part, and some offsets of the ray's start."""
-
-FREE_DEPTH = np.float32(1)
-"""Optical depth up to which light is always followed."""
 
 
 def transmittance(
@@ -35,9 +32,7 @@ def transmittance(
     surface, light sources included, blocks it. ``position`` must already be offset off its surface; ``inside`` (k, n)
     and ``owner`` (n,) say where it is (see ``Paths``).
 
-    deepest  (n,) optical depth of the first medium, in its clearest channel, at which light is given up, so that rays
-             stay short: ``FREE_DEPTH`` plus an exponential variate. Light from deeper then stands for all that would be
-             given up, and the mean is the same
+    deepest  (n,) optical depth of the first medium at which light is given up, see ``depth_roulette``
     """
     return follow(scene, position, light, inside, owner, tally, deepest)[0]
 
@@ -53,7 +48,9 @@ def follow(
 ) -> tuple[Float32, NDArray[np.int8], NDArray[np.int16]]:
     """``transmittance``, and ``inside`` and ``owner`` at the light's end, which mean nothing where it is 0."""
     media = scene.media
-    limit = None if deepest is None else _limit(media, owner, deepest)
+    limit = None
+    if deepest is not None:
+        limit = depth_roulette.reach(media.of(media.sigma_t, owner).min(axis=0), deepest)
     n = position.shape[1]
     result = np.zeros((3, n), np.float32)
     inside_there, owner_there = np.zeros((inside.shape[0], n), np.int8), np.zeros(n, np.int16)
@@ -84,8 +81,7 @@ def follow(
         depth += extinction * reach
         done = ~hit
         if limit is not None:
-            # chance has taken most of the depth beyond what is free
-            depth -= np.maximum(extinction.min(axis=0) * reach - FREE_DEPTH, 0)
+            depth -= depth_roulette.taken(extinction.min(axis=0), reach)
             done &= remaining <= limit
             limit = None
         there = active[done]
@@ -108,13 +104,6 @@ def follow(
         origin = offset_from(landing, normal[:, straight], cosine[straight])
         remaining = np.where(remaining[keep] < MISS, np.maximum(remaining[keep] - distance, 0), MISS)
     return result, inside_there, owner_there
-
-
-def _limit(media: MediaTable, owner: NDArray[np.int16], deepest: Float32) -> Float32:
-    """(n,) distance in the first medium at which light is given up."""
-    extinction = media.of(media.sigma_t, owner).min(axis=0)
-    limit = np.full(len(owner), MISS)
-    return np.divide(deepest, extinction, out=limit, where=extinction > 1 / MISS)
 
 
 def cross(inside: NDArray[np.int8], slot: NDArray[np.intp], entering: NDArray[np.bool_]) -> NDArray[np.int16]:

@@ -14,6 +14,7 @@ from renderer.render import Renderer, Settings
 from renderer.scene.description import EnvironmentLight, Light, RectangleLight, Scene, SphereLight
 from renderer.shaders import boundary, direct_light, point_light
 from renderer.tracing.acceleration import Acceleration
+from renderer.tracing.depth_roulette import drawn_depth
 from renderer.wavefront import Wavefront
 from sss_tools.mesh import Mesh
 from sss_tools.shapes import box, icosphere, moved
@@ -237,7 +238,7 @@ def test_rough_boundary_whose_paths_mistake_their_own_density_is_caught(monkeypa
 
 
 def test_light_given_up_in_the_depth_and_not_made_up_for_is_caught(monkeypatch):
-    monkeypatch.setattr(point_light, "FREE_DEPTH", np.float32(0.5))
+    monkeypatch.setattr(point_light, "drawn_depth", lambda uniform: drawn_depth(uniform) - np.float32(0.5))
     with pytest.raises(AssertionError, match="wrong mean"):
         assert_mean(under_white_sky("matched", 5, sampled=True).mean(axis=1), 1, false_alarm=FALSE_ALARM, detects=0.01)
 

@@ -6,8 +6,9 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from renderer.scene.description import PointLight, RectangleLight, SphereLight
 from renderer.scene.lights import Illumination
+from renderer.tracing.depth_roulette import FREE_DEPTH
 from renderer.tracing.paths import OUTSIDE
-from renderer.tracing.shadow import FREE_DEPTH, cross, transmittance
+from renderer.tracing.shadow import cross, transmittance
 from renderer.tracing.tally import Tally
 from renderer.tracing.traced_scene import TracedScene
 from sss_tools.shapes import box, hollow_ball, icosphere, moved
