@@ -12,7 +12,8 @@ Each case runs in a process of its own. It is judged by what it must show, or by
 - ``finite``: nothing but numbers, no light where there can be none.
 
 Means are judged at a false-alarm rate of 1e-3 over all cases (Sidak). "seen" is the relative error that is found with
-probability 0.95. Leaks must stay below 1e-5 of the paths, set-up below ``SETUP`` seconds, memory below ``MEMORY``.
+probability 0.95; where that is above half of the light the noise hides too much, and the case is "unseen", neither good
+nor bad. Leaks must stay below 1e-5 of the paths, set-up below ``SETUP`` seconds, memory below ``MEMORY``.
 --resume keeps what an earlier call has measured. Exit status 1 where a verdict is bad.
 
 Blind to: errors below what is seen; light moved within an object; twins share what both do wrong.
@@ -58,6 +59,8 @@ SETUP, MEMORY, LIMIT = 60.0, 1.5e9, 400.0
 THREADS = 2
 FAMILY = 1e-3
 LEAKS = 1e-5
+UNSEEN = 0.5
+"""Share of the light that noise may hide at most, for a comparison to say anything."""
 ROUNDING = 1e-5
 """Pixels of white bodies may be off by so much."""
 ABSORBED = 0.03
@@ -421,7 +424,7 @@ def _mean(film) -> tuple[np.ndarray, np.ndarray]:
 
 
 def verdict(row: dict, level: float) -> tuple[str, str]:
-    """What was found, and whether that is good: "yes", "refused" or what is wrong."""
+    """What was found, and whether that is good: "yes", "refused", "unseen" or what is wrong."""
     if "refused" in row:
         return row["refused"], "refused"
     if "failed" in row:
@@ -436,7 +439,7 @@ def verdict(row: dict, level: float) -> tuple[str, str]:
         wrong.append("slow")
     if row["memory"] > MEMORY:
         wrong.append("memory")
-    found = ""
+    found, seen = "", 0.0
     if row["judge"] != "finite":
         critical = stats.norm.isf(level / 6)
         difference, noise = np.array(row["difference"]), np.array(row["noise"])
@@ -444,12 +447,12 @@ def verdict(row: dict, level: float) -> tuple[str, str]:
         seen = (critical + stats.norm.isf(0.05)) * noise[k]
         found = f"{100 * difference[k]:+.2g} %, seen {100 * seen:.2g} %"
         if row["judge"] == "white" and row["worst"] < ROUNDING:
-            found = f"{row['worst']:.1g} in the worst pixel"
+            found, seen = f"{row['worst']:.1g} in the worst pixel", 0.0
         else:
             allowed = ABSORBED if row["judge"] == "law" else ROUNDING
             if (np.abs(difference) > critical * noise + allowed).any():
                 wrong.append("biased")
-    return found, ", ".join(wrong) or "yes"
+    return found, ", ".join(wrong) or ("unseen" if seen > UNSEEN else "yes")
 
 
 def main() -> int:
@@ -508,7 +511,7 @@ def markdown(rows: dict[str, dict]) -> tuple[str, bool]:
     good = True
     for name, row in rows.items():
         found, word = verdict(row, level)
-        good &= word in ("yes", "refused")
+        good &= word in ("yes", "refused", "unseen")
         cells = [
             f"{row['setup']:.1f}" if "setup" in row else "",
             f"{row['first']:.2g}" if "first" in row else "",

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from renderer.scene.description import DirectionalLight, PointLight, Scene
-from renderer.shaders import boundary, rough_light
+from renderer.shaders import boundary, path, rough_light
 from renderer.tracing import traced_scene
 from renderer.tracing.acceleration import Acceleration
 from renderer.tracing.distance_grid import DistanceGrid
@@ -16,7 +17,7 @@ from sss_tools.shapes import box, ellipsoid, icosphere, moved
 from tests.assertions import assert_mean, seed, shared_rate
 from tests.renderer.scenes import bumpy_ball, camera, picture, placed, scene, translucent, wavefront
 
-RATE = shared_rate(1e-3, 7)
+RATE = shared_rate(1e-3, 8)
 VIEW = camera((0.5, 0.4, 4), fov=34, resolution=(32, 32))
 SUN = DirectionalLight(np.array([1.0, -1, 1.5]), np.full(3, 3.0))
 SUN_IN_FRONT = replace(SUN, direction=-SUN.direction)
@@ -105,10 +106,29 @@ def test_connections_take_most_of_the_noise(monkeypatch):
     assert means(of, 160, 4).var(ddof=1) > 20 * connected
 
 
-def test_the_grid_leaves_out_only_what_is_too_deep():
+def assert_grid_changes_nothing() -> None:
     """Sees 3 % of the light."""
-    of = scene([placed(icosphere(1.0, 4), translucent(0.9, 40.0, 0.3, roughness=0.3))], [SUN_IN_FRONT], VIEW)
+    of = scene([placed(icosphere(1.0, 4), translucent(0.9, 10.0, 0.3, roughness=0.3))], [SUN_IN_FRONT], VIEW)
     grid = DistanceGrid(wavefront(of).scene.vertices, of.objects[0].mesh.faces, 48)
     plain = means(of, 240, 5)
     helped = means(of, 240, 6, acceleration=Acceleration(grid, (None,), (None,)))
     assert_mean(helped - plain, 0, false_alarm=RATE, detects=0.03 * plain.mean())
+
+
+@pytest.mark.slow
+def test_the_grid_leaves_out_only_what_is_too_deep():
+    assert_grid_changes_nothing()
+
+
+@pytest.mark.slow
+def test_leaving_out_what_seems_too_deep_is_caught(monkeypatch):
+    """Distances taken for three times as long as they are."""
+
+    def with_longer(transport, slot, grid):
+        longer = grid and SimpleNamespace(distance=lambda *where: 3 * grid.distance(*where))
+        return sound(transport, slot, longer)
+
+    sound = rough_light.RoughLight
+    monkeypatch.setattr(path, "RoughLight", with_longer)
+    with pytest.raises(AssertionError, match="wrong mean"):
+        assert_grid_changes_nothing()
