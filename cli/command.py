@@ -13,6 +13,8 @@ from typing import Any, NoReturn
 
 from sss_tools.errors import InputError, one_line
 
+from .interruption import interruptible
+
 EXIT_UNUSABLE = 2
 EXIT_INTERRUPTED = 130
 PATIENCE = 1.0
@@ -67,8 +69,23 @@ def run(program: str, body: Callable[[Sequence[str] | None], int], argv: Sequenc
 
     program  the command's name, in front of its errors
     body     takes the arguments, returns the status
-    InputError and MemoryError become one line and status 2, Ctrl-C status 130; library warnings become lines on stderr.
+    InputError and MemoryError become one line and status 2, Ctrl-C and SIGTERM status 130; library warnings become
+    lines on stderr.
     """
+    try:
+        with interruptible() as interrupted:
+            return _run(program, body, argv, interrupted)
+    except KeyboardInterrupt:  # in the moments before ``_run`` is ready for it, and after
+        complain(program, "interrupted")
+        return EXIT_INTERRUPTED
+
+
+def _run(
+    program: str,
+    body: Callable[[Sequence[str] | None], int],
+    argv: Sequence[str] | None,
+    interrupted: Callable[[], bool],
+) -> int:
     for stream in (sys.stdout, sys.stderr):
         # names of files need not be text in the terminal's encoding
         reconfigure = getattr(stream, "reconfigure", None)
@@ -95,6 +112,11 @@ def run(program: str, body: Callable[[Sequence[str] | None], int], argv: Sequenc
             return EXIT_UNUSABLE
         except SystemExit as end:
             return end.code if isinstance(end.code, int) else EXIT_UNUSABLE if end.code else 0
+        except Exception:
+            if not interrupted():
+                raise
+            complain(program, "interrupted")
+            return EXIT_INTERRUPTED
 
 
 @contextmanager

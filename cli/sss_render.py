@@ -6,8 +6,7 @@ import json
 import os
 import sys
 import time
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -16,7 +15,7 @@ from sss_tools.errors import InputError
 from sss_tools.memory import limited_memory, share_of_memory
 
 from .clock import process_start
-from .command import EXIT_INTERRUPTED, ArgumentParser, complain, progress, run, version
+from .command import ArgumentParser, complain, progress, run, version
 from .explanation import plan_at_length, plan_in_a_line
 
 if TYPE_CHECKING:
@@ -39,28 +38,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 def main(argv: Sequence[str] | None = None) -> int:
     """The command. Returns the exit status: 0 written, 2 refused, 130 interrupted with what was done written."""
-    try:
-        with _ended_like_ctrl_c():
-            return run(PROGRAM, _render, argv)
-    except KeyboardInterrupt:  # in the moments before ``run`` is ready for it, and after
-        complain(PROGRAM, "interrupted")
-        return EXIT_INTERRUPTED
-
-
-@contextmanager
-def _ended_like_ctrl_c() -> Iterator[None]:
-    """Take SIGTERM, by which batch systems end jobs, for Ctrl-C."""
-    import signal
-    import threading
-
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    before = signal.signal(signal.SIGTERM, signal.default_int_handler)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGTERM, before if before is not None else signal.SIG_DFL)
+    return run(PROGRAM, _render, argv)
 
 
 def _render(argv: Sequence[str] | None) -> int:

@@ -1,3 +1,5 @@
+import signal
+
 import pytest
 
 from cli import command
@@ -22,6 +24,53 @@ def test_an_input_error_is_one_line_and_status_two(capsys):
 
 def test_an_interrupt_is_status_130(capsys):
     assert command.run("sss-test", raising(KeyboardInterrupt())) == 130
+    assert capsys.readouterr().err == "sss-test: error: interrupted\n"
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_is_an_interrupt_and_handlers_are_put_back(number, capsys):
+    def body(argv):
+        signal.raise_signal(number)
+
+    before = signal.getsignal(number)
+    assert command.run("sss-test", body) == 130
+    assert capsys.readouterr().err == "sss-test: error: interrupted\n"
+    assert signal.getsignal(number) is before
+
+
+def test_an_interrupt_that_a_library_takes_for_an_error_of_its_own_is_one_line(capsys):
+    """As NumPy does while it is being imported."""
+
+    def body(argv):
+        try:
+            signal.raise_signal(signal.SIGINT)
+        except KeyboardInterrupt as error:
+            raise ImportError("the installation is broken") from error
+
+    assert command.run("sss-test", body) == 130
+    assert capsys.readouterr().err == "sss-test: error: interrupted\n"
+
+
+def test_an_error_without_an_interrupt_is_not_hidden():
+    with pytest.raises(ImportError):
+        command.run("sss-test", raising(ImportError("no such module")))
+
+
+def test_a_signal_that_is_ignored_stays_so():
+    def body(argv):
+        signal.raise_signal(signal.SIGINT)
+        return 7
+
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        assert command.run("sss-test", body) == 7
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+def test_an_interrupt_before_anything_is_ready_for_it_is_one_line(capsys, monkeypatch):
+    monkeypatch.setattr(command, "_run", lambda *_: raising(KeyboardInterrupt())(None))
+    assert command.run("sss-test", len) == 130
     assert capsys.readouterr().err == "sss-test: error: interrupted\n"
 
 

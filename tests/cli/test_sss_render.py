@@ -10,7 +10,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cli import sss_render
 from cli.sss_render import main
 from renderer.enough import LEAST
 from sss_tools import shapes
@@ -84,14 +83,6 @@ def test_a_bare_mesh_takes_its_material_from_a_preset_or_a_file(workplace):
     default = render(*common, source="ball.ply")
     np.testing.assert_array_equal(named["image"], filed["image"])
     assert not np.array_equal(named["image"], default["image"])
-
-
-def test_an_interrupt_before_anything_is_ready_for_it_is_one_line(capsys, monkeypatch):
-    def interrupted(*_):
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr(sss_render, "run", interrupted)
-    assert main([]) == 130 and capsys.readouterr().err == "sss-render: error: interrupted\n"
 
 
 def test_64_passes_are_the_default(workplace):
