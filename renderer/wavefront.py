@@ -189,8 +189,7 @@ class Wavefront:
         for slot, walk in enumerate(self._walks):
             inside = np.flatnonzero(paths.owner == slot)
             entered = paths.move(inside, walk.paths)
-            walk.paths.axis[:, entered] = self.scene.triangle_normal.take(walk.paths.triangle[entered], axis=1)
-            walk.paths.flies_on[entered] = True
+            walk.enter(entered)
         paths.move(np.arange(paths.count), self._flying)
 
     def _meet(self) -> None:

@@ -64,17 +64,18 @@ def pick(light: Illumination, columns: NDArray[np.intp]) -> Illumination:
 
 
 def worthwhile(
-    transport: Transport, index: NDArray[np.intp], light: Illumination, value: Float32, drawn: Float32
+    transport: Transport, index: NDArray[np.intp], light: Illumination, value: Float32, drawn: Float32 | None
 ) -> tuple[NDArray[np.intp], Float32]:
     """Which connections of the paths ``index`` to ``light`` are followed, columns of it, and their weights.
 
     value  (n,) scattering function times cosine, or phase function
-    drawn  (n,) density per steradian with which the paths themselves draw the direction to the light
+    drawn  (n,) density per steradian with which the paths themselves draw the direction to the light; may be None where
+           it has no extent
 
     Of a light with an extent, which paths may also meet, only a share counts; and little that it brings is followed
     with a probability in proportion. Lights without extent are always followed.
     """
-    if light.density is None:
+    if light.density is None or drawn is None:
         columns = np.flatnonzero(value > 0)
         return columns, value[columns]
     columns = np.flatnonzero((value > 0) & (light.density > 0))

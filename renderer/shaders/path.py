@@ -60,6 +60,7 @@ class MediumWalk:
         self._albedo = media.albedo[:, slot, None]
         self._achromatic = bool((self._sigma_t == self._sigma_t[0]).all())
         self._g = media.g[slot]
+        self._lone = scene.lights.lone
         self._lights_sampled, self._lit = scene.lights.sampled, scene.lit_collisions[slot]
         self._rough_light = RoughLight(transport, slot, self._grid) if self._lit.rough else None
         thing = scene.translucent[slot]
@@ -71,6 +72,20 @@ class MediumWalk:
         self._turned = np.empty((3, capacity), np.float32)
         self._scratch = Scratch(capacity)
         self._jumps_from = np.float32(self._jumps.pays_from() if self._jumps else np.inf)
+
+    def enter(self, entered: slice) -> None:
+        """Paths that come from a surface fly on from it. Guided ones are led out the way they came, or, in the dark,
+        towards the only light."""
+        paths = self.paths
+        paths.flies_on[entered] = True
+        if self._guide is None:
+            return
+        normal = self.transport.scene.triangle_normal.take(paths.triangle[entered], axis=1)
+        if self._lone is None:
+            paths.axis[:, entered], paths.led[entered] = normal, True
+            return
+        towards = self._lone.illuminate(paths.origin[:, entered]).direction
+        paths.axis[:, entered], paths.led[entered] = towards, np.einsum("ij,ij->j", normal, towards) < 0
 
     def step(self, standing: Paths) -> None:
         """Scatter the paths and take them to their next collision; those that meet a surface go to ``standing``."""
@@ -165,15 +180,19 @@ class MediumWalk:
         paths, local = self.paths, self._turned[:, : self.paths.count]
         guided = u_cosine < guide.share
         u = np.where(guided, u_cosine * guide.inverse_share, (u_cosine - guide.share) * guide.inverse_rest)
+        plain = paths.flies_on.copy()
+        if self._lone is not None:
+            np.copyto(u, u_cosine, where=~paths.led)
+            guided &= paths.led
+            plain |= ~paths.led
         cosine = np.where(guided, guide.sample_cosine(u), 2 * u - 1)
         turned = around(paths.axis, spherical(cosine, u_turn, local))
-        stays = paths.flies_on.copy()
-        guided &= ~stays
+        guided &= ~plain
         np.divide(flight, guide.rate(cosine), out=flight, where=guided)
 
         def weigh(flown: Float32, arrived: NDArray[np.intp]) -> Float32:
             weight = guide.weight(cosine, flown, arrived)
-            np.copyto(weight, 1, where=stays)
+            np.copyto(weight, 1, where=plain)
             return weight
 
         return turned, weigh

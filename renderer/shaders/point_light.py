@@ -55,7 +55,8 @@ def light_collisions(
         lights = (source.illuminate(position) for source, holds in held if holds)
     for light in lights:
         phase = henyey_greenstein(np.einsum("ij,ij->j", paths.direction[:, index], light.direction), media.g[slot])
-        some, weight = worthwhile(transport, index, light, phase, drawn(index, light.direction))
+        density = None if light.density is None else drawn(index, light.direction)
+        some, weight = worthwhile(transport, index, light, phase, density)
         if not len(some):
             continue
         who, light = index[some], pick(light, some)

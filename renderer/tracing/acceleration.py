@@ -26,6 +26,8 @@ GUIDE_ALBEDO, STRONG_GUIDE_ALBEDO, STRONG_GUIDE_SIZE = 0.995, 0.98, 16.0
 """Guided flights save most at low albedo, and nothing at 0.998. Three of four flights are guided, and not two,
 where no light that goes deep (bodies of many mean free paths) comes back (albedo), and where no lamp makes some of what
 comes out brighter than the rest."""
+LEAST_LEAD_ALBEDO, LEAD_ALBEDO = 0.9, 0.999
+"""Of bodies as large as that, in which flights from the dark side are led towards the only light."""
 
 
 @dataclass(frozen=True)
@@ -34,7 +36,7 @@ class Acceleration:
 
     grid    distances to the surface, None where looking them up does not pay
     jumps   ball jumps, for media with many collisions
-    guides  flights guided out of the medium
+    guides  flights guided out of the medium, or to the only light
     """
 
     grid: DistanceGrid | None
@@ -57,7 +59,7 @@ class Acceleration:
             else None
             for thing, jumps in zip(scene.translucent, dense, strict=True)
         ]
-        return cls(grid, tuple(jumps), tuple(_guide(scene, thing) for thing in scene.translucent))
+        return cls(grid, tuple(jumps), tuple(_guide(scene, slot) for slot in range(scene.media.count)))
 
 
 def _jumps_pay(scene: TracedScene, slot: int) -> bool:
@@ -98,21 +100,23 @@ def _grid(scene: TracedScene, dense: list[TracedObject], pixels: int) -> Distanc
     return None if resolution is None else DistanceGrid(scene.vertices, scene.triangles, resolution, solids)
 
 
-def _guide(scene: TracedScene, thing: TracedObject) -> Guide | None:
-    """Guided flights, where light comes out of the medium as it went in: from lights all around, not from one point."""
+def _guide(scene: TracedScene, slot: int) -> Guide | None:
+    """Guided flights: out of the medium, the way light came in, where lights are all around; or to the only light."""
+    thing = scene.translucent[slot]
     medium = thing.medium
     assert medium is not None
+    if medium.g != 0 or not medium.is_achromatic:
+        return None
     # of the brightest channel: guided by a darker one, its paths multiply weights without end, and few carry most of it
     albedo = float(medium.single_scattering_albedo.max())
     sigma_t = float(medium.sigma_t[0])
-    if (
-        medium.g != 0
-        or not medium.is_achromatic
-        or scene.lights.points
-        or not LEAST_GUIDE_ALBEDO <= albedo <= GUIDE_ALBEDO
-    ):
+    large = float((thing.upper - thing.lower).max()) * sigma_t >= STRONG_GUIDE_SIZE
+    lights = scene.lights
+    if lights.points:
+        led = large and lights.lone is not None and not scene.holds_light[:, slot].any()
+        return Guide.of(albedo, sigma_t, 0.75) if led and LEAST_LEAD_ALBEDO <= albedo <= LEAD_ALBEDO else None
+    if not LEAST_GUIDE_ALBEDO <= albedo <= GUIDE_ALBEDO:
         return None
-    size = float((thing.upper - thing.lower).max()) * sigma_t
-    lamps = scene.lights.rectangles or scene.lights.spheres
-    strong = albedo < STRONG_GUIDE_ALBEDO and size >= STRONG_GUIDE_SIZE and not lamps
+    lamps = lights.rectangles or lights.spheres
+    strong = albedo < STRONG_GUIDE_ALBEDO and large and not lamps
     return Guide.of(albedo, sigma_t, 0.75 if strong else 0.5)

@@ -15,7 +15,7 @@ from .traced_scene import MISS
 
 Float32 = NDArray[np.float32]
 
-FREE_DEPTH = np.float32(1)
+FREE_DEPTH = np.float32(2)
 """Optical depth up to which light is always followed."""
 
 

@@ -22,7 +22,8 @@ class Paths:
     direction   (3, n) float32 unit, the way the path is followed (against the light)
     throughput  (3, n) float32, a row a colour channel: radiance found next, times this, reaches the camera
     faint       (n,) float32 largest throughput below which roulette plays
-    axis        (3, n) float32 unit, outward normal where the path last stood on a surface
+    axis        (3, n) float32 unit, in media with guided flights: where they lead
+    led         (n,) bool, there: whether the path's flights are guided
     stream      (n,) uint64 state of the path's random numbers
     sample      (n,) int32 column of the radiance that the path adds to
     triangle    (n,) int32 where the path stands, for paths on surfaces
@@ -46,6 +47,7 @@ class Paths:
             "throughput": np.empty((3, capacity), np.float32),
             "faint": np.empty(capacity, np.float32),
             "axis": np.empty((3, capacity), np.float32),
+            "led": np.empty(capacity, bool),
             "stream": np.empty(capacity, np.uint64),
             "sample": np.empty(capacity, np.int32),
             "triangle": np.empty(capacity, np.int32),
@@ -75,7 +77,7 @@ class Paths:
         self.faint, self.stream, self.sample = store["faint"], store["stream"], store["sample"]
         self.triangle, self.inside, self.owner = store["triangle"], store["inside"], store["owner"]
         self.density, self.flown, self.branch = store["density"], store["flown"], store["branch"]
-        self.flies_on, self.alive = store["flies_on"], store["alive"]
+        self.led, self.flies_on, self.alive = store["led"], store["flies_on"], store["alive"]
         self.surfaces, self.steps = store["surfaces"], store["steps"]
 
     @property

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from renderer.optics.ball_jump import BallJumps, ball_jumps
 from renderer.optics.guided_flight import Guide
-from renderer.scene.description import PointLight, SphereLight
+from renderer.scene.description import DirectionalLight, PointLight, Scene, SphereLight
 from renderer.shaders import boundary
 from renderer.tracing.acceleration import Acceleration
 from renderer.tracing.distance_grid import DistanceGrid
@@ -114,6 +116,59 @@ def test_a_guide_with_a_wrong_weight_is_caught(plain, monkeypatch):
         assert_mean(channels[0] - plain[0], 0, false_alarm=1e-4, detects=0.03 * plain[0].mean())
 
 
+def backlit(sun: bool = True, **of_the_medium) -> Scene:
+    """A ball of 20 mean free paths, lit from behind by nothing but a sun or a lamp."""
+    ball = placed(icosphere(1, 3), translucent(**{"albedo": 0.95, "sigma_t": 10.0, "ior": 1.0, **of_the_medium}))
+    light = DirectionalLight(np.array([0.5, -0.5, 1]), np.full(3, 3.0))
+    return scene([ball], [light if sun else PointLight(np.array([-1.0, 1, -2]), np.full(3, 9.0))], VIEW)
+
+
+LED = {
+    "matched": backlit(albedo=[0.95, 0.93, 0.9]),
+    "rough, a lamp": backlit(sun=False, albedo=[0.95, 0.93, 0.9], ior=1.4, roughness=0.4),
+    "smooth": backlit(albedo=[0.95, 0.93, 0.9], ior=1.4),
+}
+
+
+def assert_led_flights_change_nothing(of: Scene, detects: float, passes: int = PASSES) -> None:
+    leading = chosen(of)
+    assert leading.guides[0] is not None
+    for led, plain in zip(means(of, 8, leading, passes)[:2], means(of, 9, None, passes)[:2], strict=True):
+        assert_mean(led - plain, 0, false_alarm=1e-4, detects=detects * plain.mean())
+
+
+@pytest.mark.parametrize("name", LED)
+def test_flights_that_are_led_to_the_only_light_leave_the_mean_alone(name):
+    """Sees 25 % in the channel that scatters most and in the one that scatters least."""
+    assert_led_flights_change_nothing(LED[name], 0.25, 3 * PASSES if "lamp" in name else PASSES)
+
+
+def test_led_flights_with_a_wrong_weight_are_caught(monkeypatch):
+    weight = Guide.weight
+    monkeypatch.setattr(Guide, "weight", lambda self, cosine, *rest: weight(self, 0.7 * cosine, *rest))
+    with pytest.raises(AssertionError, match="wrong mean"):
+        assert_led_flights_change_nothing(LED["matched"], 0.25)
+
+
+def test_only_paths_from_the_dark_side_are_led_and_towards_the_light():
+    """On their first flight. Seen from one side the ball is dark but for a narrow rim, from the other it is lit."""
+    for of, dark in ((backlit(), True), (replace(backlit(), camera=camera((0, 0, -5), fov=20)), False)):
+        tracer = wavefront(of, acceleration=chosen(of))
+        walk, seen = tracer._walks[0], []
+        step = walk.step
+
+        def watched(standing, walk=walk, seen=seen, step=step):
+            paths = walk.paths
+            seen.append((paths.led.copy(), paths.axis.copy()))
+            step(standing)
+
+        walk.step = watched
+        traced(tracer, 256)
+        led, axis = seen[0]
+        assert (led.mean() > 0.7) == dark and (led.mean() < 0.3) == (not dark)
+        assert_allclose(axis.T, np.broadcast_to(np.array([-0.5, 0.5, -1]) / np.sqrt(1.5), axis.T.shape), atol=1e-6)
+
+
 def test_a_white_body_still_vanishes_in_a_white_sky_when_paths_jump():
     """Every sample: for white media the tables' weights are 1 but for rounding, over a hundred jumps."""
     of = scene([placed(icosphere(1, 3), translucent([1.0] * 3, SIGMA_T, 0.0, 1.4))], [WHITE_SKY], VIEW)
@@ -157,6 +212,14 @@ def test_guides_are_chosen_where_absorption_shapes_the_light():
     assert chosen(dense((0.8, 0.8, 0.8), sigma_t=3.0)).guides[0].share == 0.5
     assert chosen(dense((0.999, 0.999, 0.999))).guides == (None,)
     assert chosen(dense((0.8, 0.8, 0.8), g=0.3)).guides == (None,)
+
+
+def test_flights_are_led_to_a_light_outside_a_large_body_that_is_alone():
+    assert chosen(backlit()).guides[0].share == 0.75
+    beside_a_sky = replace(backlit(), lights=(*backlit().lights, WHITE_SKY))
+    inside = replace(backlit(), lights=(PointLight(np.zeros(3), np.ones(3)),))
+    for other in (beside_a_sky, inside, backlit(sigma_t=3.0), backlit(albedo=0.8), backlit(g=0.3)):
+        assert chosen(other).guides == (None,)
 
 
 def test_flights_are_guided_by_the_brightest_channel():

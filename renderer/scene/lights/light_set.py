@@ -45,6 +45,12 @@ class LightSet:
         return bool(self.rectangles or self.spheres or self.skies)
 
     @property
+    def lone(self) -> PointSource | DirectionalSource | None:
+        """The light without extent that is all the light there is."""
+        others = self.environments or self.rectangles or self.spheres
+        return self.points[0] if len(self.points) == 1 and not others else None
+
+    @property
     def even(self) -> bool:
         """Whether the background is the same in all directions."""
         return all(environment.constant is not None for environment in self.environments)
