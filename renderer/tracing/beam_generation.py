@@ -49,10 +49,9 @@ class Generation:
         slope = (normal * axis).sum(axis=1)
         height = -np.einsum("ij,ij->i", normal, corners[:, 0])
         # the last row tells the length of the way from the base
-        self.planes[:, 3, :3], self.planes[:, 3, 3] = normal / slope[:, None], -height / slope
+        self.planes[3, :, :3], self.planes[3, :, 3] = normal / slope[:, None], -height / slope
         self.diagonal = float(np.linalg.norm(upper - lower))
-        self._stray = spread[:, None] * np.linalg.norm(self.planes[:, :3, :3], axis=2)
-        self._rows = [np.ascontiguousarray(self.planes[:, row]) for row in range(4)]
+        self._stray = spread * np.linalg.norm(self.planes[:3, :, :3], axis=2)
         self._corners, self._lower, self._upper = corners, lower, upper
 
     def enter(self, split) -> None:
@@ -70,7 +69,7 @@ class Generation:
         """
         keep = np.arange(len(beam))
         for row in (0, 1, 2, 3):
-            plane = np.take(self._rows[row], beam, axis=0)
+            plane = np.take(self.planes[row], beam, axis=0)
             value = plane[:, 0] * position[0]
             value += plane[:, 1] * position[1]
             value += plane[:, 2] * position[2]
@@ -78,7 +77,7 @@ class Generation:
             if row == 3:
                 within = value > 0
             else:
-                value += self._stray[beam, row] * farthest
+                value += self._stray[row, beam] * farthest
                 within = (value > 0) | ((value == 0) & self.forward[beam, row])
             some = np.flatnonzero(within)
             keep, beam, position = keep[some], beam[some], np.take(position, some, axis=1)
@@ -86,12 +85,12 @@ class Generation:
 
 
 def side_planes(corners: Float64, direction: Float64) -> tuple[Float64, NDArray[np.bool_]]:
-    """(m, 4, 4) planes through the sides of triangles along directions, positive inside, the last row left open;
+    """(4, m, 4) planes through the sides of triangles along directions, positive inside, the last row left open;
     (m, 3) whether a point on the plane itself counts as inside.
 
     Each side is taken from its lexicographically lesser end, whichever triangle asks.
     """
-    planes, forward = np.zeros((len(corners), 4, 4)), np.zeros((len(corners), 3), bool)
+    planes, forward = np.zeros((4, len(corners), 4)), np.zeros((len(corners), 3), bool)
     for k in range(3):
         a, b, third = (corners[:, (k + i) % 3] for i in range(3))
         swap = _lexically_greater(a, b)[:, None]
@@ -100,7 +99,7 @@ def side_planes(corners: Float64, direction: Float64) -> tuple[Float64, NDArray[
         offset = normal[:, 0] * begin[:, 0] + normal[:, 1] * begin[:, 1] + normal[:, 2] * begin[:, 2]
         forward[:, k] = (normal * third).sum(axis=1) > offset
         sign = np.where(forward[:, k], 1.0, -1.0)
-        planes[:, k, :3], planes[:, k, 3] = normal * sign[:, None], offset * sign
+        planes[k, :, :3], planes[k, :, 3] = normal * sign[:, None], offset * sign
     return planes, forward
 
 
@@ -133,7 +132,7 @@ def met(facets: Facets, before: Generation) -> tuple[Index, Index] | None:
 
 def least_way(facets: Facets, before: Generation, triangle: Index, beam: Index) -> Float64:
     """(c,) bound of how far beams have come when they meet facets."""
-    plane = before.planes[beam, 3]
+    plane = before.planes[3][beam]
     length = np.einsum("ckj,cj->ck", facets.corners[triangle], plane[:, :3]) - plane[:, 3:]
     return np.where(before.spread[beam] > 0, 0, np.maximum(length.min(axis=1), 0))
 
@@ -144,7 +143,7 @@ def _overlapping(facets: Facets, before: Generation, triangle: Index, beam: Inde
     corners = facets.corners
     stray = before.spread * np.minimum(before.reach, before.diagonal) + 1e-9
     for row in range(4):
-        plane = before.planes[beam, row]
+        plane = before.planes[row][beam]
         value = np.einsum("ckj,cj->kc", corners[triangle], plane[:, :3]) - plane[:, 3]
         margin = 0 if row == 3 else stray[beam] * np.sqrt((plane[:, :3] ** 2).sum(axis=1))
         some = np.maximum.reduce(value) > -margin
@@ -152,6 +151,6 @@ def _overlapping(facets: Facets, before: Generation, triangle: Index, beam: Inde
             some &= np.minimum.reduce(value) < before.reach[beam]
         keep, triangle, beam = keep[some], triangle[some], beam[some]
     own, _ = side_planes(corners[triangle], before.axis[beam])
-    value = np.einsum("ckj,csj->cks", corners[before.base[beam]], own[:, :3, :3]) - own[:, None, :3, 3]
-    margin = stray[beam][:, None] * np.linalg.norm(own[:, :3, :3], axis=2)
+    value = np.einsum("ckj,scj->cks", corners[before.base[beam]], own[:3, :, :3]) - own[:3, :, 3].T[:, None]
+    margin = stray[beam][:, None] * np.linalg.norm(own[:3, :, :3], axis=2).T
     return keep[(value.max(axis=1) > -margin).all(axis=1)]

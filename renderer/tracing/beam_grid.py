@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Float64 = NDArray[np.float64]
-MOST_ENTRIES = 8_000_000
+MOST_ENTRIES = 16_000_000
 _MOST_CELLS = 4_000_000
 _CHUNK_ENTRIES = 100_000
 _CHUNK_PAIRS = 400_000
@@ -30,7 +30,7 @@ class BeamGrid:
     spread      (m,) greatest distance of their directions from the axis, 0 for parallel beams
     reach       (m,) their length; what lies beyond the box is left out
     lower, upper  (3,) the box
-    planes      (m, 4, 4) or None: parallel beams lie where ``planes[..., :3] @ p >= planes[..., 3]`` in all four rows
+    planes      (4, m, 4) or None: parallel beams lie where ``planes[..., :3] @ p >= planes[..., 3]`` in all four rows
     name        (m,) what ``candidates`` calls each beam; rows may share one
     """
 
@@ -153,7 +153,7 @@ class BeamGrid:
         if large.any():
             box, where = _boxes(start[:, large], size[:, large], self.shape)
             beam = beam[large][box]
-            keep = self._touched(where, planes[rows], beam)
+            keep = self._touched(where, planes[:, rows], beam)
             found.append((where[keep].astype(np.int32), rows[beam[keep]]))
         cells, beams = zip(*found, strict=True)
         return np.concatenate(cells), np.concatenate(beams)
@@ -164,7 +164,7 @@ class BeamGrid:
         centre = self._lower[:, None] + (index + 0.5) * self.cell
         keep = np.ones(len(where), bool)
         for row in range(4):
-            normal, offset = planes[:, row, :3], planes[:, row, 3]
+            normal, offset = planes[row, :, :3], planes[row, :, 3]
             slack = np.abs(normal).sum(axis=1) * (self.cell * 0.500001)
             value = np.einsum("ic,ci->c", centre, normal[beam])
             keep &= value + (slack - offset)[beam] >= 0

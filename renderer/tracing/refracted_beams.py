@@ -102,7 +102,8 @@ class RefractedBeams:
         # where the light is, or, from afar, the direction towards it
         self._place = None if isinstance(source, DirectionalSource) else source.position.astype(float)[:, 0]
         self._towards = source.towards.astype(float)[:, 0] if isinstance(source, DirectionalSource) else np.zeros(3)
-        self._sides, self._side_forward = side_planes(facets.corners, -facets.normal)
+        if self._place is not None:
+            self._sides, self._side_forward = side_planes(facets.corners, -facets.normal)
         self._level = np.einsum("ij,ij->i", facets.normal, facets.corners[:, 0])
         self.generations = [self._entered()]
         self.missing = np.zeros(3)
@@ -317,8 +318,8 @@ class RefractedBeams:
         return result if generation == 0 else result.take(np.flatnonzero(good))
 
     def _on_facet(self, facet: Index, position: Float64) -> NDArray[np.bool_]:
-        planes = self._sides[facet, :3]
-        value = np.einsum("csj,jc->cs", planes[..., :3], position) - planes[..., 3]
+        planes = self._sides[:3, facet]
+        value = (np.einsum("scj,jc->sc", planes[..., :3], position) - planes[..., 3]).T
         return ((value > 0) | ((value == 0) & self._side_forward[facet])).all(axis=1)
 
 
