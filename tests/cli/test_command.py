@@ -27,8 +27,17 @@ def test_an_interrupt_is_status_130(capsys):
     assert capsys.readouterr().err == "sss-test: error: interrupted\n"
 
 
+@pytest.fixture
+def signals():
+    """As a shell leaves them to a command in the foreground; tests may run in the background."""
+    before = [signal.signal(signal.SIGINT, signal.default_int_handler), signal.signal(signal.SIGTERM, signal.SIG_DFL)]
+    yield
+    for number, handler in zip((signal.SIGINT, signal.SIGTERM), before, strict=True):
+        signal.signal(number, handler)
+
+
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_a_signal_is_an_interrupt_and_handlers_are_put_back(number, capsys):
+def test_a_signal_is_an_interrupt_and_handlers_are_put_back(number, capsys, signals):
     def body(argv):
         signal.raise_signal(number)
 
@@ -38,7 +47,7 @@ def test_a_signal_is_an_interrupt_and_handlers_are_put_back(number, capsys):
     assert signal.getsignal(number) is before
 
 
-def test_an_interrupt_that_a_library_takes_for_an_error_of_its_own_is_one_line(capsys):
+def test_an_interrupt_that_a_library_takes_for_an_error_of_its_own_is_one_line(capsys, signals):
     """As NumPy does while it is being imported."""
 
     def body(argv):
@@ -56,16 +65,13 @@ def test_an_error_without_an_interrupt_is_not_hidden():
         command.run("sss-test", raising(ImportError("no such module")))
 
 
-def test_a_signal_that_is_ignored_stays_so():
+def test_a_signal_that_is_ignored_stays_so(signals):
     def body(argv):
         signal.raise_signal(signal.SIGINT)
         return 7
 
-    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
-    try:
-        assert command.run("sss-test", body) == 7
-    finally:
-        signal.signal(signal.SIGINT, before)
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    assert command.run("sss-test", body) == 7
 
 
 def test_an_interrupt_before_anything_is_ready_for_it_is_one_line(capsys, monkeypatch):
