@@ -6,7 +6,8 @@ One process runs the commands again and again, as a server would: checks of fold
 renders by threads, interrupted ones that resume, hostile files, and both on a Dask cluster that lives as long, with
 Dask's histories shortened as docs/scaling.md advises. After every job memory, open files, threads, child processes and
 temporary files are counted, here and in the cluster's processes. What the first quarter of the time did is warming up:
-caches fill, allocators settle. What is known so far is written every few minutes.
+caches fill, allocators settle. The samples so far are written every few minutes, for ``--from``; judging them takes
+memory of its own, and waits for the end.
 
 Memory is called flat where the upper end of the 95 % interval of its slope (Theil and Sen: the median of the slopes
 between all pairs of samples, which no outlier moves), times the time measured, is less than 5 % of its median. Counts
@@ -320,15 +321,9 @@ def main() -> int:
     json_path, page = (None if path is None else path.resolve() for path in (options.json, options.page))
     note = options.note
 
-    def keep(samples: list[Sample]) -> dict[str, Verdict]:
+    def keep(samples: list[Sample]) -> None:
         if json_path is not None:
             write_samples(json_path, samples, note)
-        verdicts = judge(samples)
-        if verdicts and page is not None:
-            old = page.read_text()
-            head, tail = old.partition(BEGIN)[0], old.partition(END)[2]
-            page.write_text(f"{head}{BEGIN}\n{section(samples, verdicts, note)}\n{END}{tail}")
-        return verdicts
 
     if options.source is None:
         signal.signal(signal.SIGTERM, signal.default_int_handler)  # ends the cluster as well
@@ -337,10 +332,16 @@ def main() -> int:
         data = json.loads(options.source.read_text())
         note = data["machine"]
         samples = [Sample(**dict(zip(data["columns"], row, strict=True))) for row in data["samples"]]
-    verdicts = keep(samples)
+    keep(samples)
+    verdicts = judge(samples)
     if not verdicts:
         raise SystemExit(f"{len(samples)} jobs in {samples[-1].second:.0f} s say nothing; give it more --minutes")
-    print(section(samples, verdicts, note))
+    table = section(samples, verdicts, note)
+    print(table)
+    if page is not None:
+        old = page.read_text()
+        head, tail = old.partition(BEGIN)[0], old.partition(END)[2]
+        page.write_text(f"{head}{BEGIN}\n{table}\n{END}{tail}")
     return int(not all(verdict.flat for verdict in verdicts.values()))
 
 
