@@ -467,6 +467,7 @@ def main() -> int:
     parser.add_argument("--limit", type=float, default=LIMIT, help="seconds that a case may take (default: 400)")
     parser.add_argument("--one", help=argparse.SUPPRESS)
     parser.add_argument("--work", type=Path, default=ROOT / "out" / "stress.json", help="where rows are kept")
+    parser.add_argument("--note", default="", help="what the page says of the machine")
     parser.add_argument("-o", "--output", type=Path, default=ROOT / "docs" / "stress.md")
     options = parser.parse_args()
     if options.one:
@@ -481,7 +482,7 @@ def main() -> int:
             options.work.write_text(json.dumps(rows))
             print(name, *verdict(rows[name], sidak(FAMILY, len(CASES))), file=sys.stderr, sep=" | ")
     rows = {name: rows[name] for name in CASES if name in rows}
-    text, good = markdown(rows)
+    text, good = markdown(rows, options.note)
     options.output.parent.mkdir(parents=True, exist_ok=True)
     options.output.write_text(text)
     return 0 if good else 1
@@ -498,9 +499,10 @@ def _in_a_process(name: str, limit: float) -> dict:
     return json.loads(done.stdout.splitlines()[-1])
 
 
-def markdown(rows: dict[str, dict]) -> tuple[str, bool]:
+def markdown(rows: dict[str, dict], note: str) -> tuple[str, bool]:
     """The page, and whether all is well."""
     about, level = machine(None), sidak(FAMILY, len(CASES))
+    missing = "; ".join(name for name in CASES if name not in rows)
     lines = [
         "# The path shader at the ends of its range",
         "",
@@ -508,7 +510,9 @@ def markdown(rows: dict[str, dict]) -> tuple[str, bool]:
         f"large, renders last some seconds. {len(rows)} of {len(CASES)} cases were measured. "
         f"Family-wise false-alarm rate {FAMILY:g}. {about['processor']}, "
         f"{about['threads']} threads; Python {about['python']}, NumPy {about['numpy']}, embreex {about['embreex']}.",
+        *(["", note] if note else []),
         "",
+        *([f"Not measured: {missing}.", ""] if missing else []),
         "| case | set-up s | first pass s | passes | MB | leaks | found | good |",
         "|---|---:|---:|---:|---:|---:|---|---|",
     ]
